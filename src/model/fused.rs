@@ -23,7 +23,7 @@
 //! on the machine code of the loop does not follow.
 //!
 //! Range: identical to the instruction if `a b` and `c` are zero or from 1e-280 to 1e280, and if the result
-//! is not finite. Outside this range the error is that of two roundings.
+//! is not finite. Outside this range the error is two roundings.
 
 use fearless_simd::Simd;
 

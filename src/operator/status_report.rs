@@ -120,7 +120,7 @@ pub struct ProcessReport {
     pub command: String,
     /// User of the process, empty if it has ended.
     pub user: String,
-    /// Whether its messages are ignored, because those of another process count.
+    /// Whether its messages are ignored, because another process is used.
     #[serde(default)]
     pub is_ignored: bool,
 }

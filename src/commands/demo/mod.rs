@@ -242,7 +242,7 @@ impl Stage {
         watched.map(|()| recorder.finish())
     }
 
-    /// Gives the recording its final name, replacing that of the last demonstration, and writes its page.
+    /// Gives the recording its final name, replacing the last demonstration's recording, and writes its page.
     /// Returns the path of the page.
     fn write_page(&self, folder: &Path) -> Result<PathBuf, DemoError> {
         let (recording, page) = (folder.join(RECORDING), folder.join(PAGE));

@@ -35,7 +35,7 @@ pub fn facts(run: &Run) -> Vec<Fact> {
     facts
 }
 
-/// Facts of the run so far. `times` are those of wake-up and computation.
+/// Facts of the run so far. `times`: wake-up and computation.
 pub fn live_facts(config: &Config, history: &History, times: &[Times; 2]) -> Vec<Fact> {
     let good = |name, text| Fact { name, text, is_bad: false };
     let rate_hz = config.deployment.realtime.rate_hz;

@@ -38,7 +38,7 @@ const POLL_INTERVAL_NS: u64 = 10_000;
 /// one wake-up latency after the release, and a pause would cost as much again.
 const BUSY_POLL_TIME_NS: u64 = 50_000;
 
-/// Length of the queue of delays to the log thread, equal to that of the cycle records.
+/// Length of the queue of delays to the log thread, equal to the length of the queue of cycle records.
 pub const DELAYS: usize = 1024;
 
 /// Ports of the daemon.

@@ -134,7 +134,7 @@ impl Context {
 }
 
 impl<'a> Recorder<'a> {
-    /// Allocates all memory except that of the files.
+    /// Allocates all memory except for the files.
     pub fn new(loaded: &Loaded, memories: MemoryConsumer<'a>, folders: &Folders) -> (Self, RecorderLinks) {
         let Loaded { config, controller, .. } = loaded;
         let rate_hz = config.deployment.realtime.rate_hz;

@@ -165,14 +165,14 @@ mod tests {
                     (*low, *high) = (*high, *high + widest * samples.uniform());
                 }
             }
-            let slack = if k % 5 == 0 { 0.0 } else { 0.01 * samples.uniform() };
+            let margin = if k % 5 == 0 { 0.0 } else { 0.01 * samples.uniform() };
             let pose = TaskState::at_rest(x).motion().pose;
             let angles = task_coordinates(&pose, &home);
             // Distance by which the worst angle is inside, less the margin that its range requires.
-            let room = |slack: f64| {
+            let room = |margin: f64| {
                 let axes = angles.iter().zip(envelope.lowest.iter().zip(&envelope.highest)).take(3);
                 axes.map(|(x, (low, high))| {
-                    (x - low).min(high - x) - slack.min(MAX_MARGIN_RATIO * (high - low))
+                    (x - low).min(high - x) - margin.min(MAX_MARGIN_RATIO * (high - low))
                 })
                 .fold(f64::INFINITY, f64::min)
             };
@@ -182,9 +182,12 @@ mod tests {
                 *x += size * (2.0 * samples.uniform() - 1.0);
             }
             let ranges = AngleRanges::new(&envelope, &start);
-            let is_contained = dispatch!(level, simd => ranges.contain(simd, &pose.rotation, slack));
-            assert!(!is_contained || room(slack) > -1e-12, "{x:?} {envelope:?} {slack}");
-            assert!(is_contained || room(slack * (1.0 + slack * slack)) < 1e-6, "{x:?} {envelope:?} {slack}");
+            let is_contained = dispatch!(level, simd => ranges.contain(simd, &pose.rotation, margin));
+            assert!(!is_contained || room(margin) > -1e-12, "{x:?} {envelope:?} {margin}");
+            assert!(
+                is_contained || room(margin * (1.0 + margin * margin)) < 1e-6,
+                "{x:?} {envelope:?} {margin}"
+            );
             if is_contained { inside += 1 } else { outside += 1 }
         }
         assert!(inside > 50_000 && outside > 50_000, "{inside} {outside}");
