@@ -20,7 +20,7 @@ use crate::control::sensing::free_motion::FreeMotion;
 use crate::control::sensing::leg_rates::LegRateEstimator;
 use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::sensing::measurement::MeasurementValidator;
-use crate::control::sensing::stamp_clock::StampClock;
+use crate::control::sensing::stamp_clock::StampClockOffset;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::setpoint::validation::SetpointValidator;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -75,7 +75,7 @@ pub struct Controller {
 /// repeated.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Memory {
-    stamp_clock: StampClock,
+    stamp_clock: StampClockOffset,
     drives: DriveMonitor,
     external_pose: ExternalPose,
     measurements: MeasurementValidator,
@@ -97,7 +97,7 @@ impl Controller {
         let memory = Memory {
             localization: Localization::new(&constants),
             reference: ReferenceGenerator::new(&constants),
-            stamp_clock: StampClock::default(),
+            stamp_clock: StampClockOffset::default(),
             drives: DriveMonitor::default(),
             external_pose: ExternalPose::default(),
             measurements: MeasurementValidator::default(),

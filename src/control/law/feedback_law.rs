@@ -150,7 +150,7 @@ impl Law {
         }
     }
 
-    /// Drive forces `m_i a_i` for leg accelerations.
+    /// Drive forces `m_i a_i` for leg accelerations, with the effective mass of each drive.
     pub fn forces_of_leg_accelerations(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
         acceleration.component_mul(&self.leg_masses.mass).into()
     }

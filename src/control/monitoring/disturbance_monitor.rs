@@ -64,7 +64,7 @@ const MAX_SWING_M: f64 = 5e-3;
 /// Change of the error between two reversals, in standard deviations of a reading.
 const SWING_DEVIATIONS: f64 = 10.0;
 /// Number of swings in a row that make an oscillation.
-const SWINGS: u32 = 4;
+const MIN_OSCILLATION_SWINGS: u32 = 4;
 /// Smallest ratio of a swing to the previous one. A smaller ratio is the end of a disturbance.
 const LEAST_GROWTH: f64 = 0.9;
 /// Swing of the error times Kp, relative to the disturbance by friction.
@@ -314,7 +314,7 @@ impl Oscillation {
         (self.error_at_reversal, self.farthest, self.swing_squared) = (self.farthest, *error, back_squared);
         self.last_swing_squared = swing_squared;
         (self.since_turn_s, self.swings) = (0.0, if decays { 1 } else { self.swings.saturating_add(1) });
-        if self.swings < SWINGS {
+        if self.swings < MIN_OSCILLATION_SWINGS {
             return Ok(());
         }
         Err(Diagnostic::new(DiagnosticCode::Oscillation, 0.5 * swing_squared.sqrt(), 0.5 * bound))

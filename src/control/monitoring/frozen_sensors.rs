@@ -129,7 +129,7 @@ impl FrozenSensors {
     #[inline(never)]
     fn check_motion(
         &mut self,
-        [reference, feedback]: &[[f64; LEGS]; 2],
+        [reference, feedback_force]: &[[f64; LEGS]; 2],
         errors: &ReadingErrors,
         one_leg: &FrozenLegBounds,
     ) -> Result<(), Diagnostic> {
@@ -139,7 +139,7 @@ impl FrozenSensors {
         let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * errors.resolution);
         let mut result = Ok(());
         let first = self.reference.iter_mut().zip(&mut self.feedback);
-        let legs = first.zip(&self.equal_readings).zip(reference.iter().zip(feedback));
+        let legs = first.zip(&self.equal_readings).zip(reference.iter().zip(feedback_force));
         for (leg, (((first, first_force), equal), (reference, force))) in legs.enumerate() {
             if *equal <= 1 {
                 (*first, *first_force) = (*reference, *force);

@@ -19,7 +19,7 @@ const STROKE_TOLERANCE_RATIO: f64 = 0.02;
 /// inputs would widen it without limit. Two intervals, because one message may get lost. The longest interval
 /// counts: after a pause of the loop the first message may be too old, and the next one shows the motion of
 /// the whole pause.
-const MAX_GROWTH_INTERVALS: f64 = 2.0;
+const MAX_PLAUSIBILITY_WINDOW_INTERVALS: f64 = 2.0;
 
 /// The last valid input, and why a later one was rejected. `Valid` is the form in which a valid input is
 /// stored.
@@ -54,7 +54,7 @@ impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid
             return f64::INFINITY;
         }
         let interval_ns = self.interval_ns(now_ns).max(period_ns);
-        MAX_GROWTH_INTERVALS * (interval_ns as f64 * 1e-9)
+        MAX_PLAUSIBILITY_WINDOW_INTERVALS * (interval_ns as f64 * 1e-9)
     }
 
     /// Longest time between two inputs since the last valid one, if the next one comes now \[ns\].

@@ -4,7 +4,7 @@
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
-use crate::control::law::estimator::{EstimatorConstants, Filter};
+use crate::control::law::estimator::{EstimatorConstants, KalmanFilter};
 use crate::control::signals::errors::ErrorCoordinates;
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::time::seconds_between;
@@ -16,7 +16,7 @@ const MAX_GAP_S: f64 = 0.1;
 /// Estimator of the leg rates. It assumes that the acceleration of a leg is constant.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct LegRateEstimator {
-    filter: Option<Filter>,
+    filter: Option<KalmanFilter>,
 }
 
 impl LegRateEstimator {
@@ -29,10 +29,10 @@ impl LegRateEstimator {
     fn estimated(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
         let time_ns = measurement.time_ns;
         let measured = ErrorCoordinates { value: Vector6::from(measurement.length), rate: Vector6::zeros() };
-        let elapsed_s = |filter: &Filter| seconds_between(filter.time_ns, time_ns);
+        let elapsed_s = |filter: &KalmanFilter| seconds_between(filter.time_ns, time_ns);
         let filter = match &mut self.filter {
             Some(filter) if (0.0..MAX_GAP_S).contains(&elapsed_s(filter)) => filter,
-            other => other.insert(Filter::new(constants, time_ns, &measured)),
+            other => other.insert(KalmanFilter::new(constants, time_ns, &measured)),
         };
         let dt = elapsed_s(filter);
         if dt > 0.0 {

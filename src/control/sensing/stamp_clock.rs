@@ -16,14 +16,14 @@ const MAX_DRIFT: f64 = 0.01;
 
 /// Tracked offset between the clocks.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(in crate::control) struct StampClock {
+pub(in crate::control) struct StampClockOffset {
     /// Clock of the stamps minus the daemon's clock, as tracked \[ns\].
     offset_ns: i64,
     /// The daemon's clock at the last cycle \[ns\].
     daemon_clock_ns: u64,
 }
 
-impl StampClock {
+impl StampClockOffset {
     /// Compares the offset of this cycle \[ns\] with the tracked one. Without control it is only tracked: a
     /// larger offset, which the freshest message has, is taken over at once.
     pub fn check(&mut self, cycle: &Cycle<'_>, offset_ns: i64) -> Result<(), Diagnostic> {

@@ -28,7 +28,7 @@ pub struct SetpointMotion {
     jerk_s: f64,
 }
 
-/// A motion relative to a pose.
+/// A motion whose pose is given relative to another pose. Twist and acceleration are its own, in base axes.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control) struct RelativeMotion {
     /// Displacement from the pose to the pose of the motion \[rad\], \[m\].

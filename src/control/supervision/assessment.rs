@@ -107,8 +107,8 @@ fn check_engagement(
     start: &Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
     let Evidence { input, setpoint, error, .. } = evidence;
-    check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)?;
-    check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers)?;
+    check_no_second_publisher(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)?;
+    check_no_second_publisher(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers)?;
     check_drives_and_external_pose(evidence)?;
     (*conditioned)?;
     setpoint.age_check?;
@@ -156,16 +156,16 @@ fn check_engage_tolerance(
     Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
 }
 
-/// Whether an input has a single publisher. Control does not begin with two, because it is unknown which one
+/// Whether an input has no second publisher. Control does not begin with two, because it is unknown which one
 /// is right.
-fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
+fn check_no_second_publisher(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
     let Publishers { used_pid, ignored_pid } = publishers;
     if ignored_pid == 0 { Ok(()) } else { Err(Diagnostic::new(code, used_pid.into(), ignored_pid.into())) }
 }
 
 /// Whether the motion without force is known and a stop from it was verified.
 fn check_start(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
-    check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
+    check_no_second_publisher(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
     check_drives_and_external_pose(evidence)?;
     evidence.start
 }

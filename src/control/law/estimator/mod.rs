@@ -49,15 +49,15 @@ impl ErrorEstimate {
     }
 }
 
-/// Filter of six axes: estimate at the instant of the last measurement, and its covariance.
+/// Kalman filter of six axes: estimate at the instant of the last measurement, and its covariance.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(in crate::control) struct Filter {
+pub(in crate::control) struct KalmanFilter {
     pub state: ErrorEstimate,
     pub time_ns: u64,
     covariance: Covariance,
 }
 
-impl Filter {
+impl KalmanFilter {
     pub fn new(constants: &EstimatorConstants, time_ns: u64, error: &ErrorCoordinates) -> Self {
         let ErrorCoordinates { value, rate } = *error;
         let state = ErrorEstimate { value, rate, disturbance: Vector6::zeros() };
@@ -90,7 +90,7 @@ impl Filter {
 /// Estimator of the tracking error under control.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Estimator {
-    filter: Filter,
+    filter: KalmanFilter,
     sent: SentAccelerations,
 }
 
@@ -157,7 +157,7 @@ impl Estimator {
         error: &ErrorCoordinates,
     ) {
         let NoiseModel { period_s, .. } = constants.noise;
-        self.filter = Filter::new(constants, begin_ns, error);
+        self.filter = KalmanFilter::new(constants, begin_ns, error);
         self.filter.covariance.advance(&constants.noise, seconds_between(measured_ns, begin_ns) / period_s);
         self.sent.clear();
     }

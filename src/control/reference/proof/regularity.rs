@@ -123,7 +123,7 @@ impl BallGroup {
 
     /// Distances of a pose from each centre.
     #[inline(always)]
-    fn displacements<S: Simd>(&self, simd: S, pose: &Pose) -> Displacements<S> {
+    fn center_distances<S: Simd>(&self, simd: S, pose: &Pose) -> CenterDistances<S> {
         let squared = |columns: &[[f64; LANES]], numbers: &[f64]| {
             let columns = columns.iter().zip(numbers);
             let differences = columns
@@ -134,7 +134,7 @@ impl BallGroup {
         let half = f64x4::splat(simd, 0.5);
         let chord = (squared(&self.rotation, pose.rotation.as_slice()) * half).sqrt();
         let turn = chord * f64x4::splat(simd, ANGLE_PER_CHORD);
-        Displacements { shift, turn, chord }
+        CenterDistances { shift, turn, chord }
     }
 
     /// Whether some ball proves that every pose within a reach of a displaced pose is as regular as required.
@@ -143,7 +143,7 @@ impl BallGroup {
         &self,
         simd: S,
         constants: &Constants,
-        displacements: &Displacements<S>,
+        distances: &CenterDistances<S>,
         reach: Reach,
         required: &Regularity,
     ) -> bool {
@@ -151,8 +151,8 @@ impl BallGroup {
         let load = |column: &[f64; LANES]| f64x4::load_array(simd, *column);
         let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
         let (shortest, universal_sine) = (load(&self.shortest), load(&self.universal_sine));
-        let turn = displacements.turn + splat(reach.angular);
-        let moved = displacements.shift + splat(reach.linear) + splat(constants.arm) * turn;
+        let turn = distances.turn + splat(reach.angular);
+        let moved = distances.shift + splat(reach.linear) + splat(constants.arm) * turn;
         let left = shortest - moved;
         let turned_squared = moved * moved / (shortest * left);
         let turned_leg = turned_squared.sqrt();
@@ -161,7 +161,7 @@ impl BallGroup {
         let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM));
         let Regularity { condition, universal_sine: least_sine } = *required;
         let is_covered = left.simd_gt(splat(0.0))
-            & displacements.chord.simd_le(splat(MAX_CHORD))
+            & distances.chord.simd_le(splat(MAX_CHORD))
             & (universal_sine - turned_leg).simd_ge(splat(least_sine))
             & (largest_norm * inverse_norm).simd_le(splat(condition) * (splat(1.0) - inverse_norm * change));
         is_covered.any_true()
@@ -170,7 +170,7 @@ impl BallGroup {
 
 /// Bounds on the distance of a pose from each centre: shift \[m\] and turn \[rad\], and the chord of the
 /// turn.
-struct Displacements<S: Simd> {
+struct CenterDistances<S: Simd> {
     shift: f64x4<S>,
     turn: f64x4<S>,
     chord: f64x4<S>,
@@ -235,8 +235,8 @@ impl RegularBalls {
         dispatch!(constants.machine().level, simd => {
             for index in self.recent_first() {
                 if let Some(group) = self.groups.get(index) {
-                    let displacements = group.displacements(simd, pose);
-                    if group.covers(simd, constants, &displacements, *reach, required) {
+                    let distances = group.center_distances(simd, pose);
+                    if group.covers(simd, constants, &distances, *reach, required) {
                         self.recent = index;
                         return true;
                     }
@@ -270,8 +270,8 @@ impl RegularBalls {
         let mut are_surroundings_covered = false;
         for index in self.recent_first() {
             let Some(group) = self.groups.get(index) else { continue };
-            let displacements = group.displacements(simd, pose);
-            let covers = |reach, required| group.covers(simd, constants, &displacements, reach, required);
+            let distances = group.center_distances(simd, pose);
+            let covers = |reach, required| group.covers(simd, constants, &distances, reach, required);
             are_surroundings_covered = are_surroundings_covered || covers(reach, &around);
             // Without covered surroundings the knot becomes the centre of a new ball.
             if are_surroundings_covered && covers(Reach::default(), &at_knot) {
@@ -299,8 +299,8 @@ impl RegularBalls {
         // Another ball of the group may cover the poses as well. A new ball that is too small for the reach
         // may still prove a knot: it stays until the next new ball.
         let is_covered = dispatch!(constants.machine().level, simd => {
-            let displacements = group.displacements(simd, pose);
-            group.covers(simd, constants, &displacements, *reach, required)
+            let distances = group.center_distances(simd, pose);
+            group.covers(simd, constants, &distances, *reach, required)
         });
         if !is_covered {
             return Err(Limit::Condition.into());

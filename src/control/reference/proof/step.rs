@@ -18,7 +18,7 @@ pub(in crate::control::reference) struct Step<'a> {
 
 impl Step<'_> {
     /// Bounds on how far the velocities within the step exceed the velocities at its ends.
-    pub fn velocity_overshoot(&self) -> Pair<f64> {
+    pub fn velocity_excess_over_ends(&self) -> Pair<f64> {
         self.acceleration_change.map(|change| change * self.duration / 8.0)
     }
 }

@@ -42,7 +42,7 @@ impl Verifier {
         let Motion { pose, twist, acceleration } = motion;
         let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
-        let overshoot = step.velocity_overshoot();
+        let excess = step.velocity_excess_over_ends();
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
         let around = RegularityQuery {
             pose,
@@ -50,8 +50,8 @@ impl Verifier {
             required: Regularity::reference_bounds(constants),
         };
         let mut effort = MAX_STEP_EFFORT.saturating_sub(step.effort);
-        let is_free = shift.peak_velocity + overshoot.linear <= position.velocity
-            && turn.peak_velocity + overshoot.angular <= orientation.velocity
+        let is_free = shift.peak_velocity + excess.linear <= position.velocity
+            && turn.peak_velocity + excess.angular <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
             && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)

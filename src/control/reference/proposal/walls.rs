@@ -47,16 +47,16 @@ use crate::model::task::task_coordinates;
 
 /// Share of the limits with which a wall is approached. Several walls and the motion along them take the
 /// rest.
-const CLOSING_SHARE: f64 = 0.6;
+const WALL_CLOSING_LIMITS_SHARE: f64 = 0.6;
 /// Sweeps over the walls: 8 sweeps bring two walls at 60 degrees to within 1e-4 (2026-11-22). With many
 /// active walls there are fewer sweeps, because the next number of visits to walls bounds the longest cycle.
 /// Six walls hold every direction; more contradict each other.
 const SWEEPS: usize = 8;
 const MAX_VISITS: usize = 24;
 /// Period of the sweeps over all walls. The other sweeps cover only the active walls.
-const FULL_SWEEP: usize = 3;
-/// Visits to walls that take about as long as the examination of a knot.
-const VISITS_PER_KNOT: usize = 24;
+const SWEEPS_PER_FULL_SWEEP: usize = 3;
+/// Visits to walls that take about as long as the examination of a knot, the unit of effort.
+const WALL_VISITS_PER_EFFORT: usize = 24;
 /// Time constant of the return from a negative gap, as a multiple of the approach's time constant.
 const RETURN_RATIO: f64 = 4.0;
 
@@ -132,7 +132,7 @@ impl Walls {
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
-        let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
+        let approach = Approach::new(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let halves_s = half_durations(limits, led);
         let half_s = halves_s.angular.max(halves_s.linear);
         let per_way = 1.0 / half_s;
@@ -189,8 +189,8 @@ impl Walls {
             stacked(&zero, &Vector3::y()),
             stacked(&zero, &Vector3::z()),
         ];
-        let turning = Approach::new(limits.orientation, CLOSING_SHARE, step_s);
-        let shifting = Approach::new(limits.position, CLOSING_SHARE, step_s);
+        let turning = Approach::new(limits.orientation, WALL_CLOSING_LIMITS_SHARE, step_s);
+        let shifting = Approach::new(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let velocity = stacked(&(led.angular * radius), &led.linear);
         let per_way = half_durations(limits, led).map(f64::recip);
         let ranges = lowest.iter().zip(highest);
@@ -226,7 +226,7 @@ impl Walls {
 
     /// Effort so far, in knots of an examination.
     pub fn effort(&self) -> u32 {
-        (self.visits / VISITS_PER_KNOT) as u32
+        (self.visits / WALL_VISITS_PER_EFFORT) as u32
     }
 
     /// Changes the wanted velocities of rotation and translation by the least amount such that no wall is
@@ -256,7 +256,7 @@ impl Walls {
         let mut sweep = 0;
         while sweep < sweeps {
             let (mut is_changed, mut active) = (false, 0);
-            let is_full = sweep % FULL_SWEEP == 0;
+            let is_full = sweep % SWEEPS_PER_FULL_SWEEP == 0;
             for wall in walls.iter_mut() {
                 if !is_full && wall.multiplier == 0.0 {
                     continue;

@@ -169,7 +169,7 @@ impl Stop {
         for (dt, jerk) in brake(speed, 0.0, jerk, limit, |_| jerk) {
             pieces.push(dt, u * jerk);
         }
-        pieces.finish(v.norm().max(speed));
+        pieces.finish_with_rest(v.norm().max(speed));
     }
 
     /// Plans the stop that brakes at once, in place.
@@ -217,7 +217,7 @@ impl Stop {
         for (dt, jerk) in plan {
             pieces.push(dt, u * jerk);
         }
-        pieces.finish((peak * peak + across_speed * across_speed).sqrt());
+        pieces.finish_with_rest((peak * peak + across_speed * across_speed).sqrt());
     }
 
     /// State `t` seconds after the start; at rest from the end on.
@@ -279,9 +279,9 @@ impl<'a, S: Simd> Pieces<'a, S> {
         }
     }
 
-    /// Appends the rest at the end of the stop.
+    /// Appends the rest at the end of the stop, and stores the peak velocity.
     #[inline(always)]
-    fn finish(self, peak_velocity: f64) {
+    fn finish_with_rest(self, peak_velocity: f64) {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
         let Stop { pieces, count, begins, duration, .. } = self.stop;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {

@@ -18,7 +18,7 @@ mod timing;
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::setpoint::pose_samples::timing::{Delay, Timing};
+use crate::control::setpoint::pose_samples::timing::{Delay, SampleTiming};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
@@ -36,7 +36,7 @@ const MAX_SERIES_ANGLE_RAD: f64 = 0.5;
 /// enough for two lost samples.
 const EXTRAPOLATION_INTERVALS: f64 = 1.5;
 /// Time after that in which the motion returns to the newest sample, as a ratio of the interval.
-const RETURN_INTERVALS: f64 = 4.0;
+const RETURN_TO_NEWEST_SAMPLE_INTERVALS: f64 = 4.0;
 
 /// A sample, or the average of samples close to each other.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -79,7 +79,7 @@ pub struct PoseSamples {
     /// Ring buffer; `newest` is the index of the newest sample.
     samples: [Option<Sample>; CAPACITY],
     newest: usize,
-    timing: Timing,
+    timing: SampleTiming,
     delay: Delay,
 }
 
@@ -102,7 +102,7 @@ impl PoseSamples {
         }
         let is_first = self.timing.averaged_intervals == 0.0;
         self.timing.update(interval, seconds_between(last.time_ns, now_ns));
-        let delay = self.timing.delay();
+        let delay = self.timing.interpolation_delay_s();
         self.delay = if is_first { Delay::new(delay, now_ns) } else { self.delay.toward(delay, now_ns) };
         self.append(time_ns, pose);
         self.update_slopes();
@@ -196,7 +196,7 @@ impl PoseSamples {
     /// Pose and twist after the newest sample: first on with its twist, then back to it.
     fn after_newest(&self, newest: &Sample, wanted_ns: u64) -> (Pose, Twist) {
         let onward = EXTRAPOLATION_INTERVALS * self.timing.interval;
-        let back = RETURN_INTERVALS * self.timing.interval;
+        let back = RETURN_TO_NEWEST_SAMPLE_INTERVALS * self.timing.interval;
         let elapsed = seconds_between(newest.time_ns, wanted_ns);
         let travel = |time: f64| Twist::from_vector(&(newest.slope.vector() * time));
         if elapsed >= onward + back {

@@ -24,7 +24,7 @@ const JITTER_PER_DEVIATION: f64 = 2.25;
 
 /// Estimates of the stream's timing \[s\].
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(in crate::control::setpoint::pose_samples) struct Timing {
+pub(in crate::control::setpoint::pose_samples) struct SampleTiming {
     /// Number of intervals seen, up to the length of the average.
     pub averaged_intervals: f64,
     pub interval: f64,
@@ -36,7 +36,7 @@ pub(in crate::control::setpoint::pose_samples) struct Timing {
     before: [[f64; 2]; 2],
 }
 
-impl Timing {
+impl SampleTiming {
     pub fn update(&mut self, interval: f64, age: f64) {
         if self.averaged_intervals == 0.0 {
             (self.interval, self.age, self.before) = (interval, age, [[interval, age]; 2]);
@@ -53,7 +53,7 @@ impl Timing {
     }
 
     /// Delay \[s\] at which the samples around an instant, and the one after, have nearly always arrived.
-    pub fn delay(&self) -> f64 {
+    pub fn interpolation_delay_s(&self) -> f64 {
         (self.interval + self.age + JITTER_PER_DEVIATION * self.deviation).clamp(0.0, MAX_DELAY_S)
     }
 }
