@@ -11,3 +11,4 @@ mod observer;
 mod rates;
 mod streams;
 mod walls;
+mod weak_poses;

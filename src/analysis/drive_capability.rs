@@ -1,6 +1,6 @@
 //! Accelerations and velocities that the drives of a machine can give at a pose.
 //!
-//! With the forces of [`PoseEvaluator::leg_loads`] for 1 m/s^2 and 1 rad/s^2, and a usable force F:
+//! With the forces of [`DriveLoads`] in the worst direction, and a usable force F:
 //!
 //! ```text
 //! holding_i + a linear_i + w angular_i <= F        |v| <= rate        |omega| |b_i x n_i| <= rate
@@ -9,8 +9,11 @@
 //! for every leg i, in every direction. Each of these forces is attained, so the results are the largest. Forces of velocities are
 //! not included: leave room for them in F.
 
-use super::pose_quality::{AccelerationDemand, LegLoad, PoseEvaluator};
+use nalgebra::Vector6;
+
 use crate::model::LEGS;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::drive_loads::DriveLoads;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
@@ -35,11 +38,33 @@ pub struct DriveCapability {
     max_rate: f64,
 }
 
+/// Largest force of a leg around a pose at rest, by cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct LegLoad {
+    /// Holding the platform, with Coulomb's friction \[N\].
+    holding: f64,
+    /// Per unit of the acceleration of C in the worst direction \[kg\].
+    linear: f64,
+    /// Per unit of the angular acceleration about the worst axis \[N s^2\].
+    angular: f64,
+}
+
 impl DriveCapability {
     /// Drives at a pose; `None` where it is singular.
     pub fn new(machine: &Machine, pose: &Pose) -> Option<Self> {
-        let unit = AccelerationDemand { linear: 1.0, angular: 1.0 };
-        let loads = PoseEvaluator::new(machine, unit).leg_loads(pose)?;
+        let found = DriveLoads::new(&InverseDynamics::new(machine), pose)?;
+        let [ax, ay, az, x, y, z] = found.by_acceleration(machine).map(Vector6::from);
+        let norms = |a: &Vector6<f64>, b: &Vector6<f64>, c: &Vector6<f64>| -> [f64; LEGS] {
+            (a.component_mul(a) + b.component_mul(b) + c.component_mul(c)).map(f64::sqrt).into()
+        };
+        let mut loads = found.holding(machine).map(|force| LegLoad {
+            holding: force.abs() + machine.actuator.coulomb_friction,
+            ..LegLoad::default()
+        });
+        let directions = norms(&ax, &ay, &az).into_iter().zip(norms(&x, &y, &z));
+        for (load, (angular, linear)) in loads.iter_mut().zip(directions) {
+            (load.angular, load.linear) = (angular, linear);
+        }
         let wrenches = leg_wrenches(machine, pose);
         let arms = wrenches.column_iter().map(|wrench| wrench.fixed_rows::<3>(0).norm());
         Some(Self { loads, largest_arm: arms.fold(0.0, f64::max), max_rate: machine.actuator.max_rate })

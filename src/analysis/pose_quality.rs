@@ -67,17 +67,6 @@ pub struct PoseEvaluator {
     home_sign: f64,
 }
 
-/// Largest force of a leg around a pose at rest, without payload, by cause.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LegLoad {
-    /// Holding the platform, with Coulomb's friction \[N\].
-    pub holding: f64,
-    /// Under the demanded linear acceleration in its worst direction \[N\].
-    pub linear: f64,
-    /// Under the demanded angular acceleration about its worst axis \[N\].
-    pub angular: f64,
-}
-
 /// Quality of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseQuality {
@@ -135,16 +124,6 @@ impl PoseEvaluator {
             worst_force: legs.map_or(f64::INFINITY, worst),
             payload: legs.map_or(0.0, payload),
         }
-    }
-
-    /// Forces of the legs by cause, `None` at a singular pose. Their sums are the largest forces without payload.
-    pub fn leg_loads(&self, pose: &Pose) -> Option<[LegLoad; LEGS]> {
-        let of_leg = |leg: LegForceBound| LegLoad {
-            holding: leg.still[0].abs() + leg.friction,
-            linear: leg.linear[0].norm(),
-            angular: leg.angular[0].norm(),
-        };
-        self.leg_forces(pose).map(|legs| legs.map(of_leg))
     }
 
     /// The forces of every leg, `None` at a singular pose.

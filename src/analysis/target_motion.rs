@@ -1,11 +1,12 @@
 //! Motion of the reference to a target, in advance: the daemon's own reference generator, cycle by cycle.
 //!
 //! Position and orientation go straight to the target, each in its own time. A path that leaves the workspace is
-//! refused: the operator must choose another path. Forces are not checked.
+//! refused: the operator must choose another path.
 
 use core::fmt;
 
-use crate::control::constants::Constants;
+use super::drive_capability::DriveCapability;
+use crate::control::constants::{Constants, MAX_HOLDING_SHARE};
 use crate::control::parameters::Envelope;
 use crate::control::reference::ReferenceGenerator;
 use crate::control::setpoint::target::Target;
@@ -76,6 +77,8 @@ pub enum BoundedQuantity {
     UniversalSine,
     /// `det N / radius^3`, signed as at home.
     Determinant,
+    /// Largest force at rest, of a leg counted from 0 \[N\].
+    HoldingForce(usize),
 }
 
 impl BoundedQuantity {
@@ -84,6 +87,7 @@ impl BoundedQuantity {
             Self::Length(_) => Limit::Stroke,
             Self::Coordinate(_) => Limit::Envelope,
             Self::Condition | Self::UniversalSine | Self::Determinant => Limit::Condition,
+            Self::HoldingForce(_) => Limit::Force,
         }
     }
 }
@@ -108,6 +112,12 @@ impl fmt::Display for WorkspaceBound {
             BoundedQuantity::UniversalSine => write!(
                 f,
                 "a leg is near the first axis of its universal joint: sine {value:.3}, bound {bound:.3}"
+            ),
+            BoundedQuantity::HoldingForce(leg) => write!(
+                f,
+                "leg {}: {value:.0} N to hold the platform, bound {bound:.0} N ({:.0} % of actuator.max_force_n)",
+                leg + 1,
+                100.0 * MAX_HOLDING_SHARE
             ),
             BoundedQuantity::Determinant => f.write_str("it is on the other side of a singular pose"),
         }
@@ -164,6 +174,11 @@ pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBoun
     bounds.push(WorkspaceBound { quantity, value: condition, bound: largest, margin: largest - condition });
     let (quantity, bound) = (BoundedQuantity::UniversalSine, constants.universal_sine);
     bounds.push(WorkspaceBound { quantity, value: sine, bound, margin: sine - bound });
+    let drives = DriveCapability::new(machine, pose).map(|drives| drives.hardest_held());
+    let (leg, force) = drives.unwrap_or((0, f64::INFINITY));
+    let (quantity, bound) =
+        (BoundedQuantity::HoldingForce(leg), MAX_HOLDING_SHARE * machine.actuator.max_force);
+    bounds.push(WorkspaceBound { quantity, value: force, bound, margin: bound - force });
     bounds
 }
 
@@ -185,9 +200,10 @@ pub fn check_target(constants: &Constants, pose: &Pose) -> Result<(), TargetRefu
 /// The bound of a limit with the least margin.
 fn nearest(bounds: &[WorkspaceBound], limit: Limit) -> Option<WorkspaceBound> {
     let of_limit = bounds.iter().filter(|bound| bound.quantity.limit() == limit);
-    // Quantities without unit are compared with their bound.
+    // Other quantities than lengths and angles are compared with their bound.
     let ratio = |bound: &WorkspaceBound| {
-        if limit == Limit::Condition { bound.margin / bound.bound.abs().max(ROUNDING) } else { bound.margin }
+        let is_length = matches!(limit, Limit::Stroke | Limit::Envelope);
+        if is_length { bound.margin } else { bound.margin / bound.bound.abs().max(ROUNDING) }
     };
     of_limit.min_by(|a, b| ratio(a).total_cmp(&ratio(b))).copied()
 }
@@ -246,7 +262,7 @@ fn distance(from: &Pose, to: &Pose) -> f64 {
 /// The bound at which the way has ended.
 fn ended(constants: &Constants, pose: &Pose, stopped_by: LimitSet, share: f64) -> TargetRefusal {
     let bounds = workspace_bounds(constants, pose);
-    let limits = [Limit::Stroke, Limit::Envelope, Limit::Condition];
+    let limits = [Limit::Stroke, Limit::Envelope, Limit::Force, Limit::Condition];
     let limit = limits.into_iter().find(|limit| stopped_by.contains(*limit)).unwrap_or(Limit::Condition);
     let quantity = BoundedQuantity::Condition;
     let unknown = WorkspaceBound { quantity, value: 0.0, bound: 0.0, margin: 0.0 };

@@ -12,10 +12,14 @@ use crate::control::monitoring::weighting::least_missing_force_acceleration;
 use crate::control::parameters::Parameters;
 use crate::control::sensing::standstill::window_s;
 use crate::model::active_forces::InverseDynamics;
+use crate::model::force_changes::ForceChangeBounds;
 use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 
+/// Largest force that holding the platform may take, as a share of `actuator.max_force_n`: in the envelope, and
+/// wherever the reference goes. The rest is for motion, friction and feedback.
+pub const MAX_HOLDING_SHARE: f64 = 0.9;
 /// Share of the range from the condition at home to its limit that the reference may use.
 const REFERENCE_CONDITION_RANGE_SHARE: f64 = 0.85;
 /// Least sine of the angle between a leg and the first axis of its universal joint: 6 degrees, less than any
@@ -56,6 +60,8 @@ pub struct Constants {
     pub max_reference_condition: f64,
     /// Least sine of the angle between a leg and the first axis of its universal joint, for the reference.
     pub universal_sine: f64,
+    /// Bounds on changes of the drives' forces.
+    pub(super) force_changes: ForceChangeBounds,
 }
 
 impl Constants {
@@ -113,6 +119,7 @@ impl Constants {
             arm,
             max_reference_condition: max_reference_condition(&home, parameters.condition),
             universal_sine: least_universal_sine(machine, &home),
+            force_changes: ForceChangeBounds::new(machine),
             home,
         }
     }

@@ -273,6 +273,7 @@ pub(in crate::control) fn verify_start(
         Refusal::Limit(Limit::Condition) => {
             localization.near_singular(cycle.constants.max_reference_condition)
         }
+        Refusal::Limit(Limit::Force) => DiagnosticCode::DrivesTooWeak.into(),
         Refusal::Limit(_) | Refusal::Effort => DiagnosticCode::PlatformMoving.into(),
     })
 }

@@ -12,8 +12,8 @@
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
-use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
-use nalgebra::{Matrix6, Vector6};
+use fearless_simd::{Simd, dispatch, f64x4, f64x8, prelude::*};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::LEGS;
 use super::factorization::{Factorization, LaneWrench, wrench_columns};
@@ -22,7 +22,8 @@ use super::fidelity::{
 };
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
-use super::leg::{LegConstants, LegReaction};
+use super::lanes3::Lanes3;
+use super::leg::{JointForces, LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
@@ -86,6 +87,11 @@ impl InverseDynamics {
         &self.machine
     }
 
+    /// Joints, with the platform's centre of mass in the padding.
+    pub(super) fn joints(&self) -> &Joints {
+        &self.joints
+    }
+
     /// Actuator forces Gamma \[N\] for a motion of the platform; `None` at a singular pose.
     pub fn forces<M: ModelTerms>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
         let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion))?;
@@ -128,9 +134,10 @@ impl InverseDynamics {
         })
     }
 
-    /// W and the axial load.
+    /// W and the axial load. The arms of the legs, the acceleration and W refer to the same point of the
+    /// platform.
     #[inline(always)]
-    fn load<S: Simd, M: ModelTerms>(
+    pub(super) fn load<S: Simd, M: ModelTerms>(
         &self,
         simd: S,
         motion: &Motion,
@@ -157,6 +164,29 @@ impl InverseDynamics {
             accel = legs.accel(&velocity, joint_acceleration);
         }
         (wrench, reaction.axial + self.drive_force(simd, velocity.rate, accel))
+    }
+
+    /// Forces of the platform and the drives on each leg, per unit of the acceleration of its joint along x, y
+    /// and z, from rest.
+    #[inline(always)]
+    pub(super) fn joint_masses<S: Simd>(&self, simd: S, legs: &LegGeometry<S>) -> [JointForces<S>; 3] {
+        let reflected = legs.direction * f64x8::splat(simd, self.machine.actuator.reflected_mass);
+        let [mut x, mut y, mut z] = self.legs.joint_masses(simd, &self.machine, legs);
+        x.axial += reflected.x;
+        y.axial += reflected.y;
+        z.axial += reflected.z;
+        [x, y, z]
+    }
+
+    /// Torques of the platform's rotation per unit of the angular acceleration about an axis; their sum counts.
+    #[inline(always)]
+    pub(super) fn platform_torques<S: Simd>(
+        &self,
+        simd: S,
+        rotation: &Matrix3<f64>,
+        axis: &Vector3<f64>,
+    ) -> Lanes3<f64x4<S>> {
+        self.axes.torques(simd, rotation, &axis.cross_matrix())
     }
 
     /// Drive force `reflected L'' + viscous L' + coulomb sign(L')`; the sign is proportional below the

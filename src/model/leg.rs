@@ -165,6 +165,43 @@ impl<S: Simd> LegReaction<S> {
     }
 }
 
+/// Forces of the platform on each leg at its joint, in base axes: the part normal to the leg, and along it.
+pub(super) struct JointForces<S: Simd> {
+    pub transverse: Lanes3<f64x8<S>>,
+    pub axial: f64x8<S>,
+}
+
+impl LegConstants {
+    /// Forces per unit of the acceleration of the joint along x, y and z, from rest. With `n' = 0` the force
+    /// is `j proj(aB) + Ix / L^2 (un / yy)^2 (aB.k) k` and `m2 aB.n`.
+    #[inline(always)]
+    pub fn joint_masses<S: Simd>(
+        &self,
+        simd: S,
+        machine: &Machine,
+        legs: &LegGeometry<S>,
+    ) -> [JointForces<S>; 3] {
+        let load = |lanes: &LegLanes| lanes.load(simd);
+        let (n, square) = (legs.direction, legs.inverse_length * legs.inverse_length);
+        let [jt2, jt1, jt0] = self.jt.each_ref().map(load);
+        let j = jt2.fused_mul_add(legs.length, jt1).fused_mul_add(legs.length, jt0) * square;
+        let u = Lanes3::load(simd, &machine.joints.universal_axis);
+        let k = u.cross(n);
+        let un_over_yy = u.dot(n) / k.dot(k).max(f64x8::splat(simd, MIN_UNIVERSAL_SINE_SQUARED));
+        let spin = load(&self.axial_inertia) * square * un_over_yy * un_over_yy;
+        let (along, m2) = (j * load(&self.legs_only), load(&self.rod_mass));
+        let mut x = (k * (spin * k.x)).minus_scaled(along * n.x, n);
+        let mut y = (k * (spin * k.y)).minus_scaled(along * n.y, n);
+        let mut z = (k * (spin * k.z)).minus_scaled(along * n.z, n);
+        (x.x, y.y, z.z) = (x.x + j, y.y + j, z.z + j);
+        [
+            JointForces { transverse: x, axial: m2 * n.x },
+            JointForces { transverse: y, axial: m2 * n.y },
+            JointForces { transverse: z, axial: m2 * n.z },
+        ]
+    }
+}
+
 /// Returns `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`.
 #[inline(always)]
 fn spin<S: Simd>(

@@ -1,4 +1,4 @@
-//! Solver for six linear equations by LU with partial pivoting, and norm of an inverse by Gauss-Jordan
+//! Solver for six linear equations by LU with partial pivoting, and norms of an inverse by Gauss-Jordan
 //! elimination.
 //!
 //! ```text
@@ -7,7 +7,7 @@
 //! G.-J.:  also above; column k becomes the inverse's: a_kk <- 1, row k / a_kk; a_ik <- 0, minus a_ik row k
 //! ```
 //!
-//! Gauss-Jordan leaves `A^-1` with its columns in pivot order, which does not affect the norm.
+//! Gauss-Jordan leaves `A^-1` with its columns in pivot order, which does not affect the norms.
 //!
 //! Each step changes whole rows in lanes, finished columns included, because this is faster than a branch. No
 //! index can be out of range, so the code cannot panic; this is why nalgebra's LU is not used. The
@@ -28,14 +28,14 @@ pub(super) fn solve(level: Level, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> O
     dispatch!(level, simd => solved(simd, a, b))
 }
 
-/// Frobenius norm `|W A^-1|^2`, with W the diagonal matrix of the weights; `None` if a pivot is zero. A is
-/// given by rows.
-pub(super) fn inverse_norm_squared(
+/// Squares of the Frobenius norm of `W A^-1`, and of the norm of its largest column; `None` if a pivot is
+/// zero. W is the diagonal matrix of the weights. A is given by rows.
+pub(super) fn inverse_norms_squared(
     level: Level,
     a: &[[f64; LEGS]; LEGS],
     weights: &[f64; LEGS],
-) -> Option<f64> {
-    dispatch!(level, simd => weighted_inverse_norm(simd, a, weights))
+) -> Option<[f64; 2]> {
+    dispatch!(level, simd => weighted_inverse_norms(simd, a, weights))
 }
 
 #[inline(always)]
@@ -58,7 +58,11 @@ fn solved<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<
 }
 
 #[inline(always)]
-fn weighted_inverse_norm<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], weights: &[f64; LEGS]) -> Option<f64> {
+fn weighted_inverse_norms<S: Simd>(
+    simd: S,
+    a: &[[f64; LEGS]; LEGS],
+    weights: &[f64; LEGS],
+) -> Option<[f64; 2]> {
     let mut rows = rows_of(a, &[0.0; LEGS]);
     exchange::<_, 0>(simd, &mut rows)?;
     exchange::<_, 1>(simd, &mut rows)?;
@@ -67,13 +71,17 @@ fn weighted_inverse_norm<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], weights: &[f
     exchange::<_, 4>(simd, &mut rows)?;
     exchange::<_, 5>(simd, &mut rows)?;
     let mut sum = f64x4::splat(simd, 0.0);
+    let mut columns = [f64x4::splat(simd, 0.0); 2];
     for (row, weight) in rows.iter().zip(weights) {
-        for vector in row {
+        for (column, vector) in columns.iter_mut().zip(row) {
             let weighted = f64x4::load_array(simd, *vector) * f64x4::splat(simd, *weight);
             sum += weighted * weighted;
+            *column += weighted * weighted;
         }
     }
-    Some(sum.to_array().into_iter().sum())
+    let [first, second] = columns;
+    let largest = first.max(second).to_array().into_iter().fold(0.0, f64::max);
+    Some([sum.to_array().into_iter().sum(), largest])
 }
 
 #[inline(always)]
@@ -206,16 +214,19 @@ mod tests {
             }
             let rows: [[f64; LEGS]; LEGS] = a.transpose().into();
             let inverse = a.try_inverse().unwrap();
-            let norm = (Matrix6::from_diagonal(&weights.into()) * inverse).norm();
+            let weighted = Matrix6::from_diagonal(&weights.into()) * inverse;
+            let largest = weighted.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
             let rounding = 1e-14 * a.norm() * inverse.norm();
-            let found = inverse_norm_squared(level, &rows, &weights).unwrap().sqrt();
-            prop_assert!((found / norm - 1.0).abs() < rounding, "{found} {norm} {a}");
+            let found = inverse_norms_squared(level, &rows, &weights).unwrap();
+            for (found, norm) in found.into_iter().zip([weighted.norm(), largest]) {
+                prop_assert!((found.sqrt() / norm - 1.0).abs() < rounding, "{found} {norm} {a}");
+            }
             let b = Vector6::from(b);
             let x = Vector6::from(solve(level, &rows, &b.into()).unwrap());
             prop_assert!((x - inverse * b).norm() < rounding * inverse.norm() * b.norm(), "{x} {a}");
             let mut singular = rows;
             singular[zero_row] = [0.0; LEGS];
-            prop_assert_eq!(inverse_norm_squared(level, &singular, &weights), None);
+            prop_assert_eq!(inverse_norms_squared(level, &singular, &weights), None);
             prop_assert_eq!(solve(level, &singular, &b.into()), None);
         }
     }

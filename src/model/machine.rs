@@ -153,7 +153,9 @@ impl Joints {
     /// The leg in that lane begins far outside any platform.
     pub(super) fn with_point(&self, point: &Vector3<f64>) -> Self {
         let mut joints = self.clone();
-        for (lane, value) in joints.platform.iter_mut().zip(point.iter()) {
+        let around_center = point - self.center;
+        let lanes = joints.platform.iter_mut().chain(&mut joints.around_center);
+        for (lane, value) in lanes.zip(point.iter().chain(&around_center)) {
             *lane = lane.with_padding(*value);
         }
         let far = 1e3 * (self.radius + point.norm());

@@ -13,7 +13,7 @@
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
 //! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], |
-//! | | [`triples`], `conditioning`, `factorization`, `fused`, `lanes`, `lanes3`, `lu` |
+//! | | [`drive_loads`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu` |
 //!
 //! # Errata of the print
 //!
@@ -37,8 +37,10 @@
 
 pub mod active_forces;
 pub(crate) mod conditioning;
+pub mod drive_loads;
 mod factorization;
 pub mod fidelity;
+pub(crate) mod force_changes;
 pub mod forward_kinematics;
 mod fused;
 pub mod inverse_geometry;

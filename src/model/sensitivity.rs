@@ -64,19 +64,32 @@ impl Sensitivity {
         legs: &LegGeometry<S>,
         factorization: &Factorization<S>,
     ) -> Self {
+        let (sensitivity, _) = Self::with_largest_row(simd, joints, legs, factorization);
+        sensitivity
+    }
+
+    /// The sensitivity, and the largest norm of a row of `N^-1`.
+    #[inline(always)]
+    pub(super) fn with_largest_row<S: Simd>(
+        simd: S,
+        joints: &Joints,
+        legs: &LegGeometry<S>,
+        factorization: &Factorization<S>,
+    ) -> (Self, f64) {
         let inverse_radius = f64x8::splat(simd, 1.0 / joints.radius);
         let (share, arm_curvature) = (joints.arm_share.load(simd), joints.arm_curvature.load(simd));
         let curvature = arm_curvature.fused_mul_add(legs.inverse_length, share);
         let moment = legs.arm.cross(legs.direction) * inverse_radius;
         let (curvature, wrench) =
             (sum_legs(curvature * curvature), sum_legs(moment.dot(moment) + f64x8::splat(simd, 1.0)));
-        let inverse = inverse_norm_squared(factorization, legs);
-        Self {
+        let [inverse, largest_row] = inverse_norms_squared(factorization, legs);
+        let sensitivity = Self {
             condition: (wrench * inverse).sqrt(),
             norm: wrench.sqrt(),
             determinant: factorization.determinant() * joints.inverse_radius_cubed,
             trusted_step: MAX_KANTOROVICH_H / (curvature * inverse).sqrt(),
-        }
+        };
+        (sensitivity, largest_row.sqrt())
     }
 }
 
@@ -86,19 +99,20 @@ fn sum_legs<S: Simd>(v: f64x8<S>) -> f64 {
     (first + second).legs().into_iter().sum()
 }
 
-/// Square of the Frobenius norm of `N^-1`, torques divided by the radius. It bounds the leg forces that
-/// balance a unit wrench, in newtons at the radius. Not finite at a singular pose.
+/// Squares of the Frobenius norm of `N^-1`, and of the norm of its largest row, torques divided by the
+/// radius. They bound the leg forces that balance a unit wrench, in newtons at the radius. Not finite at a
+/// singular pose.
 ///
 /// ```text
 /// rows of B: torque t_j = c_j / dS               force p_j = -sum_i (t_j . m_i) a_i / dA
 /// rows of A: torque     - sum_j X_ij t_j         force a_i / dA - sum_j X_ij p_j
 /// ```
 #[inline(always)]
-fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeometry<S>) -> f64 {
+fn inverse_norms_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeometry<S>) -> [f64; 2] {
     let simd = factorization.simd;
     if !factorization.uses_blocks {
         let n = wrench_columns(&factorization.joints.triples, legs);
-        return inverse_norm_squared_by_lu(simd.level(), &n, factorization.joints.radius);
+        return inverse_norms_squared_by_lu(simd.level(), &n, factorization.joints.radius);
     }
     let r = f64x4::splat(simd, factorization.joints.radius);
     let [i0, i1, i2] = factorization.inverse_a.broadcasts();
@@ -109,16 +123,18 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
     let ([t0, t1, t2], [p0, p1, p2]) = (t.broadcasts(), p.broadcasts());
     let torque_a = (t0 * x0).plus_scaled(x1, t1).plus_scaled(x2, t2);
     let force_a = factorization.inverse_a.minus_scaled(x0, p0).minus_scaled(x1, p1).minus_scaled(x2, p2);
-    let torques = t.dot(t) + torque_a.dot(torque_a);
-    let forces = p.dot(p) + force_a.dot(force_a);
-    (torques * r).fused_mul_add(r, forces).legs().into_iter().sum()
+    let row = |torque: f64x4<S>, force: f64x4<S>| (torque * r).fused_mul_add(r, force);
+    let (torque_b, torque_a) = (t.dot(t), torque_a.dot(torque_a));
+    let (force_b, force_a) = (p.dot(p), force_a.dot(force_a));
+    let largest = row(torque_b, force_b).max(row(torque_a, force_a)).legs().into_iter().fold(0.0, f64::max);
+    [row(torque_b + torque_a, force_b + force_a).legs().into_iter().sum(), largest]
 }
 
-/// The same norm by elimination with partial pivoting.
+/// The same norms by elimination with partial pivoting.
 #[cold]
 #[inline(never)]
-fn inverse_norm_squared_by_lu(level: Level, n: &Matrix6<f64>, radius: f64) -> f64 {
+fn inverse_norms_squared_by_lu(level: Level, n: &Matrix6<f64>, radius: f64) -> [f64; 2] {
     // The columns of N are the rows of its transpose.
     let weights = [radius, radius, radius, 1.0, 1.0, 1.0];
-    lu::inverse_norm_squared(level, n.as_ref(), &weights).unwrap_or(f64::INFINITY)
+    lu::inverse_norms_squared(level, n.as_ref(), &weights).unwrap_or([f64::INFINITY; 2])
 }

@@ -167,7 +167,7 @@ fn least_room(constants: &Constants, from: &Pose, to: &Pose) -> f64 {
             bound.margin
                 / match bound.quantity {
                     Is::Length(_) | Is::Coordinate(_) => stroke,
-                    Is::Condition | Is::UniversalSine => bound.bound,
+                    Is::Condition | Is::UniversalSine | Is::HoldingForce(_) => bound.bound,
                     Is::Determinant => f64::MIN_POSITIVE,
                 }
         };

@@ -1,11 +1,12 @@
 //! Examination of `[envelope]`: stroke, singular poses and condition by proof, forces at sample poses.
 
 use super::Examiner;
-use super::machine::{MAX_HOLDING_RATIO, examine_holding};
+use super::machine::examine_holding;
 use crate::analysis::clearance::{Clearance, WorkspaceLimit};
 use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::analysis::region_proof::{RegionProof, poses, prove};
 use crate::config::machine::rounded;
+use crate::control::constants::MAX_HOLDING_SHARE;
 use crate::model::LEGS;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
@@ -54,7 +55,7 @@ fn examine_forces(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     let held = forces.map(hardest).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
     let Some((state, (leg, force))) = held else { return };
     let force = force + machine.actuator.coulomb_friction;
-    if force > MAX_HOLDING_RATIO * machine.actuator.max_force {
+    if force > MAX_HOLDING_SHARE * machine.actuator.max_force {
         let mut offsets: [f64; 6] = state.x.into();
         offsets.iter_mut().zip(machine.home).for_each(|(x, home)| *x -= home);
         examine_holding(examiner, leg, force, &format!("within [envelope] {}", offset_text(&offsets)));

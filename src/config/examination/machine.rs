@@ -4,13 +4,11 @@ use super::Examiner;
 use crate::analysis::drive_capability::DriveCapability;
 use crate::analysis::leg_crossing::{CrossingKind, LegCrossing, leg_crossings};
 use crate::config::machine::rounded;
+use crate::control::constants::MAX_HOLDING_SHARE;
 use crate::model::LEGS;
 use crate::model::machine::Machine;
 use nalgebra::Vector3;
 
-/// Largest share of the actuators' force that holding the platform may take: a tenth remains for feedback and
-/// friction.
-pub const MAX_HOLDING_RATIO: f64 = 0.9;
 /// Largest cosine between gravity and the direction from base to platform, for a platform that stands on its legs:
 /// 120 deg.
 const MAX_STANDING_COSINE: f64 = -0.5;
@@ -21,7 +19,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
     let Some(drives) = DriveCapability::new(machine, &pose) else { return };
     let (leg, force) = drives.hardest_held();
     examine_holding(examiner, leg, force, "at home");
-    if force <= MAX_HOLDING_RATIO * machine.actuator.max_force {
+    if force <= MAX_HOLDING_SHARE * machine.actuator.max_force {
         examine_limits(examiner, &drives);
     }
     for crossing in leg_crossings(machine, &pose) {
@@ -33,14 +31,14 @@ pub(super) fn examine(examiner: &mut Examiner) {
 /// Rejects drives that cannot hold the platform with a margin. The leg counts from 0.
 pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, place: &str) {
     let limit = examiner.config.machine.actuator.max_force;
-    if force > MAX_HOLDING_RATIO * limit {
+    if force > MAX_HOLDING_SHARE * limit {
         let bound = format!(
             "must be at least {} to hold the platform: leg {} needs {} N {place}, {:.0} % of the limit, and at most {:.0} % may be needed",
-            rounded((force / MAX_HOLDING_RATIO).ceil()),
+            rounded((force / MAX_HOLDING_SHARE).ceil()),
             leg + 1,
             rounded(force),
             100.0 * force / limit,
-            100.0 * MAX_HOLDING_RATIO,
+            100.0 * MAX_HOLDING_SHARE,
         );
         examiner.error("actuator.max_force_n", format!("{limit}"), bound);
     }

@@ -74,6 +74,14 @@ const MAX_STEPS: f64 = 32.0;
 /// and perhaps against a bound.
 const PROPORTIONAL_STEPS_AFTER_REFUSAL: u32 = 50;
 
+/// Changes of the strength in a step that is refused because of forces, and in a step that is accepted. From
+/// the least strength to all of it takes 1.5 s (2026-11-26: with 0.8 and 1.01 the acceleration changes four times
+/// as much on the way to a weak pose).
+const STRENGTH_REDUCTION: f64 = 0.6;
+const STRENGTH_GROWTH: f64 = 1.003;
+/// Least strength: with less, the approach loses its numerical precision.
+const MIN_STRENGTH: f64 = 0.01;
+
 /// Reference generator.
 ///
 /// ```
@@ -115,6 +123,9 @@ pub struct ReferenceGenerator {
     history: History,
     /// Share of the limits with which the reference closes the distance to a target.
     closing_scale: f64,
+    /// Share of the acceleration limits of proposals and stops. It decreases where the drives cannot give
+    /// more, and grows again.
+    strength: f64,
     /// Limits that restricted the reference in the last cycle.
     active_limits: LimitSet,
     /// Steps after a refusal in which rotation and translation still change in proportion.
@@ -133,6 +144,7 @@ impl ReferenceGenerator {
             verifier: Verifier::default(),
             history: History::default(),
             closing_scale: 1.0,
+            strength: 1.0,
             active_limits: LimitSet::default(),
             proportional_steps_left: 0,
         }
@@ -145,10 +157,20 @@ impl ReferenceGenerator {
     pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Refusal> {
         self.motion = *motion;
         self.bounds = PoseBounds::relaxed_to(constants, &motion.pose);
-        let (step, spare) = (Step::default(), self.stop.spare());
-        let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step, spare);
-        self.stop.adopt(verified.unwrap_or(StopKind::BrakeAtOnce));
+        let step = Step { strength: self.strength, ..Step::default() };
+        let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
+        // The strength of the next attempt. A platform at rest needs none.
+        match verified {
+            Ok(_) => {}
+            Err(Refusal::Limit(Limit::Force)) => self.reduce_strength(),
+            Err(_) => self.strength = (self.strength / STRENGTH_REDUCTION).min(1.0),
+        }
+        self.stop.adopt(verified.unwrap_or(StopKind::BrakeAtOnce), step.strength);
         verified.map(drop)
+    }
+
+    fn reduce_strength(&mut self) {
+        self.strength = (self.strength * STRENGTH_REDUCTION).max(MIN_STRENGTH);
     }
 
     /// Begins at an instant, with the motion of the last [`Self::verify_start`].
@@ -253,19 +275,26 @@ impl ReferenceGenerator {
                 angular: (next.angular - now.angular).norm(),
                 linear: (next.linear - now.linear).norm(),
             };
-            let step = Step { from: Some(&begin.pose), duration: step_s, acceleration_change, effort };
+            let Self { strength, .. } = *self;
+            let step =
+                Step { from: Some(&begin.pose), duration: step_s, acceleration_change, effort, strength };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.proportional_steps_left = match verified {
                 Ok(_) => self.proportional_steps_left.saturating_sub(1),
                 Err(_) => PROPORTIONAL_STEPS_AFTER_REFUSAL,
             };
-            verified
+            match verified {
+                Ok(_) => self.strength = (self.strength * STRENGTH_GROWTH).min(1.0),
+                Err(Refusal::Limit(Limit::Force)) => self.reduce_strength(),
+                Err(_) => {}
+            }
+            (verified, strength)
         });
         match verified {
-            Some(Ok(kind)) => self.stop.adopt(kind),
+            Some((Ok(kind), strength)) => self.stop.adopt(kind, strength),
             refused => {
-                if let Some(Err(Refusal::Limit(limit))) = refused {
+                if let Some((Err(Refusal::Limit(limit)), _)) = refused {
                     self.active_limits = self.active_limits.with(limit, true);
                 }
                 self.motion = self.stop.follow(constants, &begin, step_s);
@@ -283,7 +312,7 @@ impl ReferenceGenerator {
         desired: &RelativeMotion,
         h: f64,
     ) -> (Acceleration, u32) {
-        let limits = target.limits(&constants.parameters.limits);
+        let limits = target.limits(&constants.parameters.limits).with_accelerations_scaled(self.strength);
         let closing_scale = target.closing_scale(self.closing_scale);
         let approach = |limits| Approach::new(limits, closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));

@@ -180,6 +180,12 @@ codes! {
         "the lengths do not show that the platform stands",
         "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m sets for \
         how long the lengths are watched";
+    /// The drives cannot hold the platform here, or cannot stop its motion.
+    DrivesTooWeak = 15, None,
+        NO_NUMBER,
+        "the drives are too weak for this pose, or for a stop from this motion",
+        "move the platform towards home without hexad; check actuator.max_force_n and the payload in the \
+        machine file";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop,
         absolute("age", "s", "exceeds", "timeouts.setpoint_ms"),

@@ -19,7 +19,11 @@
 //! continues over one wrong message among valid ones, and a stream of wrong messages ends in a stop. Under
 //! "limit" the reference follows as near as the limits allow.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use serde::{Deserialize, Serialize};
+
+use crate::model::rigid::Acceleration;
 
 /// Limit by the number of its bit in a [`LimitSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,6 +146,29 @@ impl Limits {
             orientation: self.orientation.scaled(scale),
             autonomous_scale: self.autonomous_scale,
         }
+    }
+}
+
+impl Limits {
+    /// Accelerations times a factor, and the velocities that are stopped within the same distance.
+    pub fn with_accelerations_scaled(&self, scale: f64) -> Self {
+        let scaled = |limits: &DerivativeLimits| DerivativeLimits {
+            velocity: scale.sqrt() * limits.velocity,
+            acceleration: scale * limits.acceleration,
+            jerk: limits.jerk,
+        };
+        Self { position: scaled(&self.position), orientation: scaled(&self.orientation), ..*self }
+    }
+
+    /// Accelerations that are not below a present one.
+    pub(in crate::control) fn containing(&self, present: &Acceleration) -> Self {
+        let mut limits = *self;
+        for (limits, present) in
+            [(&mut limits.orientation, &present.angular), (&mut limits.position, &present.linear)]
+        {
+            limits.acceleration = limits.acceleration.max(present.norm());
+        }
+        limits
     }
 }
 

@@ -24,6 +24,7 @@ use crate::control::reference::proof::angle_ranges::{AngleRanges, cosine_of_beta
 use crate::control::reference::proof::cubic_departure::{
     CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, length_acceleration_bound, length_jerk_bound,
 };
+use crate::control::reference::proof::drive_forces::ForceProof;
 use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTERVALS};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::position_ranges::PositionRanges;
@@ -83,6 +84,8 @@ pub(in crate::control::reference) struct StopExamination<'a> {
     /// Regularity of `from`, and the envelope extended to contain it; computed when they are first needed.
     start_regularity: Option<Regularity>,
     relaxed: Option<(Envelope, AngleRanges)>,
+    /// Proof of the drives' forces.
+    forces: ForceProof,
     /// Remaining effort, in knots.
     effort: u32,
     /// Bounds of the lengths, in lanes.
@@ -98,6 +101,7 @@ impl<'a> StopExamination<'a> {
         motion: &Motion,
         x: Option<&[f64; 6]>,
         step: &Step<'a>,
+        forces: ForceProof,
         effort: u32,
     ) -> Result<Self, Refusal> {
         let limits = &constants.parameters.limits;
@@ -153,6 +157,7 @@ impl<'a> StopExamination<'a> {
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
+            forces,
         })
     }
 
@@ -258,11 +263,11 @@ impl<'a> StopExamination<'a> {
     ) -> Result<(), Refusal> {
         let constants = self.constants;
         let reach = self.stop.reach(state, dt, &constants.parameters.limits);
-        if balls.prove_knot_from_kept(simd, constants, pose, reach) {
+        if balls.prove_knot_from_kept(simd, constants, pose, reach, &mut self.forces) {
             return Ok(());
         }
         let around = RegularityQuery { pose, reach, required: Regularity::between_knots_bounds(constants) };
-        let regularity = balls.prove_from_new(constants, &around, &mut self.effort)?;
+        let regularity = balls.prove_from_new(constants, &around, &mut self.forces, &mut self.effort)?;
         let at_knot = Regularity::reference_bounds(constants);
         if at_knot.is_kept_by(&regularity) || self.is_no_worse_than_start(&regularity)? {
             return Ok(());

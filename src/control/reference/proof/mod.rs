@@ -10,12 +10,14 @@
 //! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
 //! | `pose_bounds` | bounds of the leg lengths, and the envelope |
 //! | `regularity` | balls of poses proved regular, for the limit of the condition |
+//! | `drive_forces` | whether the drives can give what a stop takes |
 //! | `refusal` | why a step is refused |
 //! | `tolerances` | allowances for rounding and between knots |
 //! | `padding` | vectors of three numbers in four lanes |
 
 pub(super) mod angle_ranges;
 pub(super) mod cubic_departure;
+pub(super) mod drive_forces;
 pub(super) mod examination;
 pub(super) mod knots;
 pub(super) mod padding;

@@ -1,16 +1,18 @@
-//! Bounds of the pose that the reference keeps: leg lengths, and the envelope of X.
+//! Bounds of the pose that the reference keeps: leg lengths, the envelope of X, and forces of the drives.
 
 use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
+use crate::control::reference::proof::drive_forces::ForceBounds;
 use crate::control::reference::proof::tolerances::{END_STOP_RATIO, ROUNDING, START_RATIO};
 use crate::model::LEGS;
+use crate::model::drive_loads::DriveLoads;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::Pose;
 use crate::model::task::task_coordinates;
 
-/// Bounds of the leg lengths and of X. If the platform is beyond the nominal bounds when control begins, they
+/// Bounds of the leg lengths, of X and of the forces. If the platform is beyond the nominal bounds when control begins, they
 /// are relaxed to its pose, so that it may return. They follow the reference back to the nominal bounds.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseBounds {
@@ -19,6 +21,7 @@ pub(in crate::control::reference) struct PoseBounds {
     /// Largest leg lengths \[m\].
     pub longest: [f64; LEGS],
     pub envelope: Option<Envelope>,
+    pub forces: ForceBounds,
     is_relaxed: bool,
 }
 
@@ -33,6 +36,7 @@ impl PoseBounds {
                 lowest: lowest.map(|x| x - ROUNDING),
                 highest: highest.map(|x| x + ROUNDING),
             }),
+            forces: ForceBounds::new(constants.machine()),
             is_relaxed: false,
         }
     }
@@ -58,6 +62,9 @@ impl PoseBounds {
                 bounds.is_relaxed |=
                     relax(low, *x, -room, f64::NEG_INFINITY) | relax(high, *x, room, f64::INFINITY);
             }
+        }
+        if let Some(loads) = DriveLoads::new(&constants.dynamics, pose) {
+            bounds.is_relaxed |= bounds.forces.relax_to(constants, &loads);
         }
         bounds
     }
@@ -86,6 +93,7 @@ impl PoseBounds {
             inner(&mut own.lowest, &other.lowest, f64::max);
             inner(&mut own.highest, &other.highest, f64::min);
         }
+        self.forces = self.forces.tighter_of(&around.forces);
         self.is_relaxed = around.is_relaxed;
     }
 }

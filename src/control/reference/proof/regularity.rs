@@ -19,10 +19,11 @@
 //! found. All balls of a group are tried at once, one in each lane and without a branch. So the effort does
 //! not depend on the ball that covers the pose.
 
-use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
+use fearless_simd::{Simd, dispatch, f64x4, mask64x4, prelude::*};
 use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
+use crate::control::reference::proof::drive_forces::{BallLoads, CenterDistance, ForceProof};
 use crate::control::reference::proof::refusal::Refusal;
 use crate::control::signals::limits::Limit;
 use crate::control::signals::pair::Pair;
@@ -137,16 +138,16 @@ impl BallGroup {
         CenterDistances { shift, turn, chord }
     }
 
-    /// Whether some ball proves that every pose within a reach of a displaced pose is as regular as required.
+    /// Which balls prove that every pose within a reach of a displaced pose is as regular as required.
     #[inline(always)]
-    fn covers<S: Simd>(
+    fn coverage<S: Simd>(
         &self,
         simd: S,
         constants: &Constants,
         distances: &CenterDistances<S>,
         reach: Reach,
         required: &Regularity,
-    ) -> bool {
+    ) -> Coverage<S> {
         let splat = |number: f64| f64x4::splat(simd, number);
         let load = |column: &[f64; LANES]| f64x4::load_array(simd, *column);
         let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
@@ -164,7 +165,33 @@ impl BallGroup {
             & distances.chord.simd_le(splat(MAX_CHORD))
             & (universal_sine - turned_leg).simd_ge(splat(least_sine))
             & (largest_norm * inverse_norm).simd_le(splat(condition) * (splat(1.0) - inverse_norm * change));
-        is_covered.any_true()
+        Coverage { is_covered, turn, turned_leg, change }
+    }
+}
+
+/// Balls of a group that cover poses, and t, q and D of these poses.
+struct Coverage<S: Simd> {
+    is_covered: mask64x4<S>,
+    turn: f64x4<S>,
+    turned_leg: f64x4<S>,
+    change: f64x4<S>,
+}
+
+impl<S: Simd> Coverage<S> {
+    /// The lane of the ball that covers the poses with the least change of N.
+    #[inline(always)]
+    fn nearest(&self, simd: S) -> Option<(usize, CenterDistance)> {
+        if !self.is_covered.any_true() {
+            return None;
+        }
+        let changes = self.is_covered.select(self.change, f64x4::splat(simd, f64::INFINITY)).to_array();
+        let lanes = changes.into_iter().enumerate();
+        let (lane, change) =
+            lanes.fold((0, f64::INFINITY), |least, lane| if lane.1 < least.1 { lane } else { least });
+        let of_lane = |lanes: f64x4<S>| lanes.to_array().get(lane).copied().unwrap_or(f64::INFINITY);
+        let distance =
+            CenterDistance { turn: of_lane(self.turn), turned_leg: of_lane(self.turned_leg), change };
+        Some((lane, distance))
     }
 }
 
@@ -183,6 +210,7 @@ struct Ball {
     shortest: f64,
     /// Regularity of the centre.
     regularity: Regularity,
+    loads: BallLoads,
 }
 
 impl Ball {
@@ -190,14 +218,16 @@ impl Ball {
     /// pivots are needed: their effort is subtracted afterwards.
     fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
-        let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
-            Conditioning::new(constants.machine(), center);
+        let Conditioning { sensitivity, largest_row, loads, shortest, universal_sine, is_pivoted } =
+            Conditioning::new(&constants.dynamics, center);
         if is_pivoted {
             *effort = effort.saturating_sub(PIVOTING_EFFORT);
         }
         let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };
-        Ok(Self { norm, inverse_norm: condition / norm, shortest, regularity })
+        let inverse_norm = condition / norm;
+        let loads = BallLoads::new(&loads.ok_or(Limit::Condition)?, inverse_norm, largest_row);
+        Ok(Self { norm, inverse_norm, shortest, regularity, loads })
     }
 }
 
@@ -216,6 +246,8 @@ pub(in crate::control::reference) struct RegularityQuery<'a> {
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct RegularBalls {
     groups: [BallGroup; GROUPS],
+    /// Loads of the drives at the centres, group by group.
+    loads: [BallLoads; GROUPS * LANES],
     /// Index of the group that covered the last pose.
     recent: usize,
     /// Number of balls that were kept, modulo the capacity. The next ball replaces the oldest.
@@ -223,20 +255,33 @@ pub(in crate::control::reference) struct RegularBalls {
 }
 
 impl RegularBalls {
-    /// Whether all poses of a query are proved regular: by the balls that are kept, or by a new one if the
-    /// effort suffices. `false` is no proof of the contrary.
-    pub fn prove(&mut self, constants: &Constants, around: &RegularityQuery<'_>, effort: &mut u32) -> bool {
-        self.prove_from_kept(constants, around) || self.prove_from_new(constants, around, effort).is_ok()
+    /// Whether all poses of a query are proved regular, and strong enough for a stop: by the balls that are
+    /// kept, or by a new one if the effort suffices. `false` is no proof of the contrary.
+    pub fn prove(
+        &mut self,
+        constants: &Constants,
+        around: &RegularityQuery<'_>,
+        forces: &mut ForceProof,
+        effort: &mut u32,
+    ) -> bool {
+        self.prove_from_kept(constants, around, forces)
+            || self.prove_from_new(constants, around, forces, effort).is_ok()
     }
 
     /// Whether the balls that are kept prove all poses of a query.
-    fn prove_from_kept(&mut self, constants: &Constants, around: &RegularityQuery<'_>) -> bool {
+    fn prove_from_kept(
+        &mut self,
+        constants: &Constants,
+        around: &RegularityQuery<'_>,
+        forces: &mut ForceProof,
+    ) -> bool {
         let RegularityQuery { pose, reach, required } = around;
         dispatch!(constants.machine().level, simd => {
             for index in self.recent_first() {
                 if let Some(group) = self.groups.get(index) {
                     let distances = group.center_distances(simd, pose);
-                    if group.covers(simd, constants, &distances, *reach, required) {
+                    let coverage = group.coverage(simd, constants, &distances, *reach, required);
+                    if self.are_strong(simd, constants, index, &coverage, forces) {
                         self.recent = index;
                         return true;
                     }
@@ -244,6 +289,33 @@ impl RegularBalls {
             }
             false
         })
+    }
+
+    /// Whether a ball of a group proves that the drives are strong enough for a stop among covered poses.
+    #[inline(always)]
+    fn are_strong<S: Simd>(
+        &self,
+        simd: S,
+        constants: &Constants,
+        group: usize,
+        coverage: &Coverage<S>,
+        forces: &mut ForceProof,
+    ) -> bool {
+        let Some((ball, distance)) = self.nearest(simd, group, coverage) else { return false };
+        forces.holds(simd, &constants.force_changes, ball, &distance)
+    }
+
+    /// The nearest ball of a group that covers poses, by index, and the distance of the poses from its centre.
+    #[inline(always)]
+    fn nearest<S: Simd>(
+        &self,
+        simd: S,
+        group: usize,
+        coverage: &Coverage<S>,
+    ) -> Option<((usize, &BallLoads), CenterDistance)> {
+        let (lane, distance) = coverage.nearest(simd)?;
+        let index = group * LANES + lane;
+        Some(((index, self.loads.get(index)?), distance))
     }
 
     /// Indices of the groups. The group that covered the last pose comes first, because the next pose is
@@ -264,6 +336,7 @@ impl RegularBalls {
         constants: &Constants,
         pose: &Pose,
         reach: Reach,
+        forces: &mut ForceProof,
     ) -> bool {
         let [at_knot, around] =
             [Regularity::reference_bounds(constants), Regularity::between_knots_bounds(constants)];
@@ -271,10 +344,17 @@ impl RegularBalls {
         for index in self.recent_first() {
             let Some(group) = self.groups.get(index) else { continue };
             let distances = group.center_distances(simd, pose);
-            let covers = |reach, required| group.covers(simd, constants, &distances, reach, required);
-            are_surroundings_covered = are_surroundings_covered || covers(reach, &around);
+            if !are_surroundings_covered {
+                let coverage = group.coverage(simd, constants, &distances, reach, &around);
+                are_surroundings_covered = self.are_strong(simd, constants, index, &coverage, forces);
+            }
             // Without covered surroundings the knot becomes the centre of a new ball.
-            if are_surroundings_covered && covers(Reach::default(), &at_knot) {
+            if !are_surroundings_covered {
+                continue;
+            }
+            let coverage = group.coverage(simd, constants, &distances, Reach::default(), &at_knot);
+            let Some((ball, distance)) = self.nearest(simd, index, &coverage) else { continue };
+            if forces.is_held(&constants.force_changes, ball.1, &distance) {
                 self.recent = index;
                 return true;
             }
@@ -289,6 +369,7 @@ impl RegularBalls {
         &mut self,
         constants: &Constants,
         around: &RegularityQuery<'_>,
+        forces: &mut ForceProof,
         effort: &mut u32,
     ) -> Result<Regularity, Refusal> {
         let RegularityQuery { pose, reach, required } = around;
@@ -296,15 +377,24 @@ impl RegularBalls {
         let index = self.next_slot / LANES;
         let group = self.groups.get_mut(index).ok_or(Refusal::Effort)?;
         group.set(self.next_slot % LANES, pose, &ball);
+        *self.loads.get_mut(self.next_slot).ok_or(Refusal::Effort)? = ball.loads;
+        forces.forget();
         // Another ball of the group may cover the poses as well. A new ball that is too small for the reach
         // may still prove a knot: it stays until the next new ball.
-        let is_covered = dispatch!(constants.machine().level, simd => {
+        let group = *group;
+        dispatch!(constants.machine().level, simd => {
             let distances = group.center_distances(simd, pose);
-            group.covers(simd, constants, &distances, *reach, required)
-        });
-        if !is_covered {
-            return Err(Limit::Condition.into());
-        }
+            let coverage = group.coverage(simd, constants, &distances, *reach, required);
+            if !coverage.is_covered.any_true() {
+                Err(Limit::Condition)
+            } else if !self.are_strong(simd, constants, index, &coverage, forces)
+                || !forces.is_held(&constants.force_changes, &ball.loads, &CenterDistance::default())
+            {
+                Err(Limit::Force)
+            } else {
+                Ok(())
+            }
+        })?;
         self.recent = index;
         self.next_slot = (self.next_slot + 1) % (GROUPS * LANES);
         Ok(ball.regularity)

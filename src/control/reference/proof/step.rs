@@ -4,7 +4,7 @@ use crate::control::signals::pair::Pair;
 use crate::model::rigid::Pose;
 
 /// Step of constant jerk. The stop that is verified begins at its end.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct Step<'a> {
     /// Pose at the start of the step; `None` for the first motion.
     pub from: Option<&'a Pose>,
@@ -14,6 +14,14 @@ pub(in crate::control::reference) struct Step<'a> {
     pub acceleration_change: Pair<f64>,
     /// Effort that the proposal took, in knots of an examination.
     pub effort: u32,
+    /// Share of the accelerations with which the stop is planned.
+    pub strength: f64,
+}
+
+impl Default for Step<'_> {
+    fn default() -> Self {
+        Self { from: None, duration: 0.0, acceleration_change: Pair::default(), effort: 0, strength: 1.0 }
+    }
 }
 
 impl Step<'_> {

@@ -6,6 +6,12 @@ pub(in crate::control::reference) const BETWEEN_KNOTS_RATIO: f64 = 2.5e-5;
 /// Distance of relaxed bounds beyond a pose that is outside the nominal bounds when control begins, as a part
 /// of the stroke. It is above the noise of lengths.
 pub(in crate::control::reference) const START_RATIO: f64 = BETWEEN_KNOTS_RATIO;
+/// Force at rest by which its bound may be exceeded between two knots, as a part of the bound in motion. Without
+/// this allowance a platform at the bound could only leave it in the directions in which the force decreases most.
+pub(in crate::control::reference) const FORCE_BETWEEN_KNOTS_RATIO: f64 = 0.01;
+/// Room of the relaxed bound of the force at rest beyond the force at a pose, as a part of the largest force: the
+/// way back is proved within it.
+pub(in crate::control::reference) const START_FORCE_RATIO: f64 = 0.01;
 /// Distance of relaxed bounds from the end stops, as a part of the stroke: the allowance between knots, and
 /// as much for the following error. A platform nearer to an end stop may return. Control may not begin while
 /// the platform moves towards it.

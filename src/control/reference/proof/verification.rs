@@ -8,11 +8,13 @@ use serde::{Deserialize, Serialize};
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::cubic_departure::length_acceleration_bound;
+use crate::control::reference::proof::drive_forces::{ForceProof, StopDemand};
 use crate::control::reference::proof::examination::{MAX_STEP_EFFORT, StopExamination};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
+use crate::control::reference::stop::acceleration_ranges::AccelerationRanges;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::stop::vector_stop::{StopExtent, release_first_extent};
 use crate::control::signals::limits::Limits;
@@ -40,8 +42,9 @@ impl Verifier {
     ) -> Result<StopKind, Refusal> {
         let Limits { orientation, position, .. } = &constants.parameters.limits;
         let Motion { pose, twist, acceleration } = motion;
-        let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
-        let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
+        let limits = constants.parameters.limits.with_accelerations_scaled(step.strength);
+        let turn = release_first_extent(&twist.angular, &acceleration.angular, &limits.orientation);
+        let shift = release_first_extent(&twist.linear, &acceleration.linear, &limits.position);
         let excess = step.velocity_excess_over_ends();
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
         let around = RegularityQuery {
@@ -49,23 +52,28 @@ impl Verifier {
             reach: Pair { angular: turn.length, linear: shift.length },
             required: Regularity::reference_bounds(constants),
         };
+        let forces = |kind, speeds, limits: &Limits| {
+            let accelerations = AccelerationRanges::of_stop(kind, motion, limits);
+            ForceProof::new(StopDemand { accelerations, speeds }, bounds.forces, kind)
+        };
+        let speeds = Pair { angular: turn.peak_velocity, linear: shift.peak_velocity };
+        let mut free = forces(StopKind::ReleaseFirst, speeds, &limits);
         let mut effort = MAX_STEP_EFFORT.saturating_sub(step.effort);
         let is_free = shift.peak_velocity + excess.linear <= position.velocity
             && turn.peak_velocity + excess.angular <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
             && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)
-            && self.balls.prove(constants, &around, &mut effort);
+            && self.balls.prove(constants, &around, &mut free, &mut effort);
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
-        brake_at_once.plan(
-            constants.machine().level,
-            StopKind::BrakeAtOnce,
-            motion,
-            &constants.parameters.limits,
-        );
-        StopExamination::new(constants, bounds, brake_at_once, motion, x.as_ref(), step, effort)?
+        let limits = limits.containing(acceleration);
+        brake_at_once.plan(constants.machine().level, StopKind::BrakeAtOnce, motion, &limits);
+        let PoseStop { orientation, position } = &*brake_at_once;
+        let speeds = Pair { angular: orientation.peak_velocity, linear: position.peak_velocity };
+        let forces = forces(StopKind::BrakeAtOnce, speeds, &limits);
+        StopExamination::new(constants, bounds, brake_at_once, motion, x.as_ref(), step, forces, effort)?
             .check_knots(&mut self.balls, motion)?;
         Ok(StopKind::BrakeAtOnce)
     }

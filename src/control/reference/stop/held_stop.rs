@@ -29,6 +29,8 @@ pub(in crate::control::reference) struct HeldStop {
     /// release-first stop is planned only when it is followed.
     stops: [PoseStop; 2],
     is_second_held: bool,
+    /// Share of the accelerations with which the stop is planned.
+    strength: f64,
     state: PoseStopState,
     pub(in crate::control::reference) elapsed_s: f64,
 }
@@ -42,8 +44,9 @@ impl HeldStop {
 
     /// Holds a stop of this kind, verified from the present motion on. A stop that brakes at once was planned
     /// in the spare slot.
-    pub fn adopt(&mut self, kind: StopKind) {
+    pub fn adopt(&mut self, kind: StopKind, strength: f64) {
         self.is_second_held ^= kind == StopKind::BrakeAtOnce;
+        self.strength = strength;
         self.phase = Phase::Verified(kind);
     }
 
@@ -84,7 +87,8 @@ impl HeldStop {
 
     fn begin(&mut self, constants: &Constants, kind: StopKind, motion: &Motion) {
         if let StopKind::ReleaseFirst = kind {
-            self.spare().plan(constants.machine().level, kind, motion, &constants.parameters.limits);
+            let limits = constants.parameters.limits.with_accelerations_scaled(self.strength);
+            self.spare().plan(constants.machine().level, kind, motion, &limits);
             self.is_second_held ^= true;
         }
         (self.phase, self.state, self.elapsed_s) = (Phase::Followed, PoseStopState::begin(motion), 0.0);

@@ -89,6 +89,22 @@ pub(in crate::control::reference) fn straight_extent(
     StopExtent { peak_velocity: v, duration, length }
 }
 
+/// Direction u of the stop that brakes at once: along the velocity, or the acceleration if there is none.
+pub(in crate::control::reference) fn braking_direction(
+    v: &Vector3<f64>,
+    a: &Vector3<f64>,
+    limits: &DerivativeLimits,
+) -> Vector3<f64> {
+    let (speed, magnitude) = (v.norm(), a.norm());
+    if speed > NEGLIGIBLE_RATIO * limits.velocity {
+        v / speed
+    } else if magnitude > 0.0 {
+        a / magnitude
+    } else {
+        Vector3::zeros()
+    }
+}
+
 /// Displacement, velocity and acceleration at one instant of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(in crate::control::reference) struct StopState {
@@ -182,14 +198,7 @@ impl Stop {
         limits: &DerivativeLimits,
     ) {
         let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
-        let (speed, magnitude) = (v.norm(), a.norm());
-        let u = if speed > NEGLIGIBLE_RATIO * limits.velocity {
-            v / speed
-        } else if magnitude > 0.0 {
-            a / magnitude
-        } else {
-            Vector3::zeros()
-        };
+        let u = braking_direction(v, a, limits);
         let rest = a - u * a.dot(&u);
         let c = rest.norm();
         let mut pieces = Pieces::new(simd, self, v, a);

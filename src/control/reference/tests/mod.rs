@@ -1,7 +1,9 @@
 //! Tests of the reference generator: dense searches for a counterexample, next to motions that are just
 //! accepted.
 
+use crate::control::reference::proof::drive_forces::{ForceBounds, ForceProof, StopDemand};
 use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
+use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::tests::*;
 
 mod approach;
@@ -19,5 +21,11 @@ mod verification;
 /// as needed.
 fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: Pair<f64>) -> bool {
     let around = RegularityQuery { pose, reach, required: Regularity::reference_bounds(constants) };
-    balls.prove(constants, &around, &mut u32::MAX.clone())
+    balls.prove(constants, &around, &mut unlimited_forces(), &mut u32::MAX.clone())
+}
+
+/// Proof of forces that no stop exceeds.
+fn unlimited_forces() -> ForceProof {
+    let bounds = ForceBounds { holding: f64::INFINITY, moving: f64::INFINITY };
+    ForceProof::new(StopDemand::default(), bounds, StopKind::ReleaseFirst)
 }

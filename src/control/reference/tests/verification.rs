@@ -116,7 +116,7 @@ impl PlayedStep {
     fn step(&self) -> Step<'_> {
         let norms = Pair { angular: self.jerk.angular.norm(), linear: self.jerk.linear.norm() };
         let acceleration_change = norms.map(|jerk| jerk * self.duration);
-        Step { from: self.from.as_ref(), duration: self.duration, acceleration_change, effort: 0 }
+        Step { from: self.from.as_ref(), duration: self.duration, acceleration_change, ..Step::default() }
     }
 }
 

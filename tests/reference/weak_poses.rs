@@ -1,0 +1,168 @@
+//! Poses where the drives are weak: the reference stays where they can hold the platform, takes no more than they can give,
+//! and leaves every pose that it reaches. Forces are those of the inverse dynamics at the reference's own motion.
+
+use hexad::analysis::target_motion::check_target;
+use hexad::config::Config;
+use hexad::control::constants::{Constants, MAX_HOLDING_SHARE};
+use hexad::control::reference::ReferenceGenerator;
+use hexad::control::setpoint::target::Target;
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Exact;
+use hexad::model::random::Random;
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::common::certificate::Certificate;
+use super::common::rig::parameters;
+
+const SHIPPED: [&str; 4] = ["motion_base", "fried2008", "tsai2000", "reference"];
+
+/// Forces of the drives at home as shares of the largest force, for machines from barely sufficient to generous.
+const HOLDING_AT_HOME: [f64; 4] = [0.6, 0.4, 0.2, 0.05];
+
+/// The constants of a shipped machine, whose drives need this share of their force at home if one is given.
+fn constants(name: &str, holding: Option<f64>) -> Constants {
+    let mut config = Config::load(format!("config/{name}.toml").as_ref()).unwrap();
+    if let Some(holding) = holding {
+        let at_home = held(&InverseDynamics::new(&config.machine), &config.machine.home_pose());
+        config.machine.actuator.max_force = at_home / holding;
+    }
+    let mut parameters = parameters(&config);
+    parameters.limits.autonomous_scale = 1.0;
+    Constants::new(&config.machine, parameters)
+}
+
+/// The largest force at rest, as a share of the drives' largest force.
+fn held(dynamics: &InverseDynamics, pose: &Pose) -> f64 {
+    share(dynamics, &Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() })
+        * dynamics.machine().actuator.max_force
+}
+
+fn share(dynamics: &InverseDynamics, motion: &Motion) -> f64 {
+    let forces = dynamics
+        .forces::<Exact>(motion)
+        .map_or(f64::INFINITY, |forces| forces.into_iter().map(f64::abs).fold(0.0, f64::max));
+    forces / dynamics.machine().actuator.max_force
+}
+
+fn begun(constants: &Constants, pose: &Pose) -> ReferenceGenerator {
+    let mut reference = ReferenceGenerator::new(constants);
+    let start = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
+    assert_eq!(reference.verify_start(constants, &start), Ok(()), "{pose:?}");
+    reference.begin_placed_motion(0);
+    reference
+}
+
+/// Moves towards a pose for so many cycles. Returns the largest share of the force, and whether the pose was reached.
+fn go(
+    reference: &mut ReferenceGenerator,
+    constants: &Constants,
+    to: &Pose,
+    speed: f64,
+    cycles: u32,
+) -> (f64, bool) {
+    let mut largest = 0.0_f64;
+    for _ in 0..cycles {
+        let end_ns = reference.time_ns() + constants.parameters.period_ns;
+        reference.advance(constants, end_ns, Some(&Target::Pose { pose: to, speed_share: speed }));
+        largest = largest.max(share(&constants.dynamics, reference.motion()));
+        let left = reference.motion().pose.displacement_to(to);
+        if left.linear.norm() < 1e-6
+            && left.angular.norm() < 1e-6
+            && reference.motion().twist.vector().norm() < 1e-6
+        {
+            return (largest, true);
+        }
+    }
+    (largest, false)
+}
+
+/// Random targets anywhere, reached or not, then home: no force beyond the drives', and home is always reached.
+#[test]
+fn certificate_no_pose_is_reached_that_the_drives_cannot_leave() {
+    let runs = SHIPPED.len() * HOLDING_AT_HOME.len();
+    let certificate = Certificate::new("weak poses", runs as u64 * 4, runs as u64 * 400);
+    let searched: Vec<_> = (0..certificate.total())
+        .into_par_iter()
+        .map(|run| {
+            let (name, holding) = (SHIPPED[run as usize % 4], HOLDING_AT_HOME[run as usize / 4 % 4]);
+            let constants = constants(name, Some(holding));
+            let mut random = Random::new(run);
+            let home = *constants.home.pose();
+            let mut reference = begun(&constants, &home);
+            let stroke = constants.machine().actuator.stroke();
+            let (mut largest, mut passed) = (0.0_f64, vec![home]);
+            for _ in 0..8 {
+                let mut vector = |size: f64| Vector3::from_fn(|_, _| random.signed()) * size;
+                let away = Twist { angular: vector(0.8), linear: vector(1.2 * stroke) };
+                let speed = [1.0, 0.3][usize::from(random.uniform() < 0.3)];
+                let (force, _) = go(&mut reference, &constants, &home.displaced(&away), speed, 700);
+                largest = largest.max(force);
+                passed.push(reference.motion().pose);
+            }
+            // The straight way home may be barred: back over the poses that were passed, from each of them home if that is
+            // possible.
+            let is_home = passed.iter().rev().any(|pose| {
+                go(&mut reference, &constants, pose, 1.0, 3000);
+                let (force, is_home) = go(&mut reference, &constants, &home, 1.0, 10_000);
+                largest = largest.max(force);
+                is_home
+            });
+            assert!(is_home, "{name}, {holding} at home, run {run}: {:?}", reference.motion());
+            certificate.advance(1);
+            largest
+        })
+        .collect();
+    let largest = searched.into_iter().fold(0.0, f64::max);
+    println!("largest share of the force {largest:.4}");
+    assert!(largest < 1.0 && largest > 0.9, "{largest}");
+}
+
+/// In 24 directions the reference reaches nearly every pose that the drives can hold.
+#[test]
+fn slow_motions_reach_nearly_all_poses_that_the_drives_can_hold() {
+    let constants = constants("motion_base", None);
+    let home = *constants.home.pose();
+    let ways: Vec<_> = (0..24_u64)
+        .into_par_iter()
+        .map(|way| {
+            let mut random = Random::new(way);
+            let direction = Vector3::from_fn(|_, _| random.signed()).normalize();
+            let turn = Vector3::from_fn(|_, _| random.signed()) * f64::from(way as u32 % 3) * 0.2;
+            let at = |distance: f64| {
+                home.displaced(&Twist { angular: turn * distance, linear: direction * distance })
+            };
+            let possible = (1..2000)
+                .map(|k| f64::from(k) * 1e-3)
+                .take_while(|distance| check_target(&constants, &at(*distance)).is_ok())
+                .last()
+                .unwrap();
+            let mut reference = begun(&constants, &home);
+            go(&mut reference, &constants, &at(possible), 0.1, 60_000);
+            let left = reference.motion().pose.displacement_to(&at(possible)).linear.norm();
+            1.0 - left / possible
+        })
+        .collect();
+    println!("{ways:.3?}");
+    assert!(ways.iter().all(|share| *share > 0.97), "{ways:.3?}");
+}
+
+/// A platform that begins beyond the bound may leave, and gets no farther.
+#[test]
+fn a_start_where_the_drives_are_weak_is_left_towards_poses_that_need_less_force() {
+    let constants = constants("motion_base", None);
+    let home = *constants.home.pose();
+    let below = |z: f64| Pose { position: home.position + Vector3::z() * z, ..home };
+    let holding = |pose: &Pose| held(&constants.dynamics, pose) / constants.machine().actuator.max_force;
+    let start = below(-1.04);
+    assert!((0.92..0.97).contains(&holding(&start)) && holding(&start) > MAX_HOLDING_SHARE);
+    let mut reference = begun(&constants, &start);
+    go(&mut reference, &constants, &below(-1.2), 1.0, 2000);
+    let reached = holding(&reference.motion().pose);
+    assert!(reached < holding(&start) + 0.01, "{reached}");
+    let (force, is_home) = go(&mut reference, &constants, &home, 1.0, 20_000);
+    assert!(is_home && force < 1.0, "{force}, {:?}", reference.motion());
+    go(&mut reference, &constants, &start, 1.0, 20_000);
+    assert!(holding(&reference.motion().pose) <= MAX_HOLDING_SHARE);
+}
