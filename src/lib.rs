@@ -61,7 +61,7 @@
 //! | disturbance | acceleration of the platform that the model does not contain: payload, friction, process forces |
 //! | driver | process that measures the legs and applies the forces |
 //! | engage | operator request to take the platform under control |
-//! | envelope | range of pose, velocity and acceleration of a task |
+//! | envelope | poses of a task, which the reference keeps, with required velocities and accelerations |
 //! | estimator | filter that gives error, its rate and the disturbance at the instant at which a force acts |
 //! | estop, off | operator requests that disable forces at once; after estop until `clear` |
 //! | fault | state without valid forces until an operator clears it |

@@ -1,5 +1,5 @@
-//! Motion envelope, as motion bases are specified: a box of task coordinates about home with limits of velocity and
-//! acceleration, and sets of sample points of it.
+//! Motion envelope, as motion bases are specified: a box of task coordinates about home with required velocities and
+//! accelerations, and sets of sample points of it.
 //!
 //! The box has 18 dimensions: X, X', X''. A point has a coordinate in \[0, 1\] for each: 0 is the lower end, 1 the upper
 //! one. Two sets of points, the same on every computer:
@@ -49,9 +49,9 @@ pub struct EnvelopeBounds {
     pub pose_min: [f64; 6],
     /// Highest offset of X from home, at least 0.
     pub pose_max: [f64; 6],
-    /// Largest magnitude of X', angle rates first.
+    /// Largest required magnitude of X', angle rates first.
     pub velocity: [f64; 6],
-    /// Largest magnitude of X''.
+    /// Largest required magnitude of X''.
     pub acceleration: [f64; 6],
 }
 

@@ -175,6 +175,7 @@ struct Plan<'a> {
 impl fmt::Display for Plan<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { constants, from, origin, to, speed, motion } = self;
+        let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
         writeln!(f, "{}{}{}from is {origin}", heading(), row("from", from), row("to", to))?;
         writeln!(
@@ -208,8 +209,8 @@ impl fmt::Display for Plan<'_> {
         let limits = if limits.is_empty() { "nothing".into() } else { limits.join(", ") };
         writeln!(
             f,
-            "limited by {limits} of the time, with {} of [limits] (limits.autonomous_scale and --speed)",
-            percent(speed * constants.parameters.limits.autonomous_scale)
+            "limited by {limits} of the time, with {} of [limits] (limits.scale, limits.autonomous_scale and --speed)",
+            percent(speed * parameters.limits_scale * parameters.limits.autonomous_scale)
         )
     }
 }

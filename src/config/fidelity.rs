@@ -58,7 +58,7 @@ pub fn reason(comparison: &FidelityComparison, tolerance: f64) -> String {
             fidelity if fidelity == chosen => {
                 write!(
                     text,
-                    "leaving out {what} costs at most {share} of the peak force, tolerance {tolerance}"
+                    "leaving out {what} costs {share} of the peak force, the largest found; tolerance {tolerance}"
                 )
             }
             // Fidelities with more terms than the chosen one need no reason.

@@ -76,8 +76,9 @@ impl Constants {
         let acceleration_by_command = InputMatrix::at_home(machine, *mode, leg_masses, parameters.fidelity);
         let disturbance =
             acceleration_by_command.largest_compensable_disturbance(max_compensated_disturbance);
+        let limits = parameters.unscaled_limits();
         let feedback_only =
-            parameters.law.max_leg_acceleration_without_feedforward(&parameters.limits, arm, &disturbance);
+            parameters.law.max_leg_acceleration_without_feedforward(&limits, arm, &disturbance);
         let angle_weighting_radius_m = if mode.acts_on_legs() { 1.0 } else { arm };
         let by_force = acceleration_by_command.acceleration_by_force(machine, home.pose());
         let least_missing =
@@ -106,7 +107,7 @@ impl Constants {
                 parameters.noise,
                 parameters.reading_errors,
                 if parameters.law.compensates_disturbance { disturbance } else { unbounded },
-                parameters.limits.position.acceleration + feedback_only,
+                limits.position.acceleration + feedback_only,
             ),
             rest_window_s: window_s(&parameters),
             leg_rate_estimator: EstimatorConstants::new(

@@ -31,6 +31,8 @@ pub struct Parameters {
     pub fidelity: Fidelity,
     /// Limits of every reference.
     pub limits: Limits,
+    /// Factor that `limits` contain, `limits.scale`.
+    pub limits_scale: f64,
     /// Range of the setpoints; `None` means no bounds.
     pub envelope: Option<Envelope>,
     /// Largest condition of the pose, see [`crate::model::sensitivity`].
@@ -80,6 +82,12 @@ impl Parameters {
     /// The period \[s\].
     pub(super) fn period_s(&self) -> f64 {
         self.period_ns as f64 * 1e-9
+    }
+
+    /// Limits without `limits_scale`, for bounds on disturbances and on measured motion, which do not become smaller
+    /// when the reference becomes slower.
+    pub(super) fn unscaled_limits(&self) -> Limits {
+        self.limits.scaled(1.0 / self.limits_scale)
     }
 
     /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided

@@ -20,6 +20,8 @@ pub struct StatusReport {
     pub configuration: ConfigurationReport,
     /// Age of the described cycle \[s\]; `None` before the first.
     pub age_s: Option<f64>,
+    /// `limits.scale`; `None` if the daemon is older than this field.
+    pub limits_scale: Option<f64>,
     /// Names of the limits that the cycle has reached or nearly reached.
     pub active_limits: Vec<String>,
     /// Rate and missed deadlines.

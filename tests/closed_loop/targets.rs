@@ -56,6 +56,54 @@ fn a_target_is_reached_gently_and_stood_at_without_further_messages() {
     }
 }
 
+/// `limits.scale` holds for everything that moves: targets, and setpoints of a source far beyond it.
+#[test]
+fn with_a_tenth_of_the_limits_no_motion_exceeds_a_tenth() {
+    for (name, kind) in
+        MACHINES.into_iter().flat_map(|name| [(name, SetpointKind::Target), (name, SetpointKind::Motion)])
+    {
+        let mut config = with_policy(name, ViolationPolicy::Limit);
+        config.deployment.limits.reference.autonomous_scale = 1.0;
+        let full = parameters(&config);
+        config.deployment.limits.scale = 0.1;
+        let mut ride = Ride::new(&config);
+        ride.felt = TrueMotion::new(&ride.rig, &full);
+        let there = beside(&ride.home, Vector6::new(0.05, 0.0, -0.05, 0.0, 0.03, -0.04));
+        for cycle in 0..4000 {
+            let output = ride.cycle(kind, Some(there));
+            let found = (output.state, output.diagnostic.code);
+            assert_eq!(found, (State::Active, DiagnosticCode::None), "{name} {kind:?} {cycle}");
+        }
+        assert!(ride.distance(&there).into_iter().all(|distance| distance < 1e-6), "{name} {kind:?}");
+        let Largest { velocity, acceleration, jerk, .. } = ride.felt.largest;
+        println!("{name} {kind:?}: {:?}", ride.felt.largest);
+        for (value, bound) in [(velocity, 1.001), (acceleration, TRUE_ACCELERATION), (jerk, TRUE_JERK)] {
+            assert!(value <= 0.1 * bound, "{name} {kind:?}: {value} of the limit");
+        }
+        assert!(acceleration > 0.08, "{name} {kind:?}: {acceleration}");
+    }
+}
+
+/// A payload that the file does not have needs an acceleration of feedback far beyond the scaled limits.
+#[test]
+fn a_slow_platform_carries_an_unknown_payload_as_a_fast_one_does() {
+    for scale in [1.0, 0.05] {
+        let mut config = with_policy("motion_base", ViolationPolicy::Stop);
+        config.deployment.limits.scale = scale;
+        let mut loaded = config.machine.clone();
+        loaded.platform.mass *= 1.15;
+        let mut rig = Rig::new(&config, &loaded);
+        let home = TaskState::at_rest(config.machine.home);
+        rig.ask(Request::Engage);
+        for cycle in 0..2000 {
+            let output = rig.cycle(&rig.input(&home));
+            assert_eq!(output.diagnostic.code, DiagnosticCode::None, "scale {scale}, {cycle}");
+        }
+        let distance = (rig.simulator.state().pose.position - home.motion().pose.position).norm();
+        assert!(distance < 1e-6, "scale {scale}: {distance}");
+    }
+}
+
 /// Control may begin on a target however far it is; the distance is closed with the limits of autonomous motions.
 #[test]
 fn control_begins_on_a_target_far_away() {

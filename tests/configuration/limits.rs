@@ -1,6 +1,6 @@
 //! Limits of the reference and of feedback, and what becomes of setpoints beyond them.
 
-use hexad::config::deployment::Deployment;
+use hexad::config::deployment::{Deployment, DeploymentLimits};
 use hexad::config::{Config, Violation};
 use hexad::control::parameters::ViolationPolicy;
 use hexad::model::inverse_geometry::leg_lengths;
@@ -74,6 +74,23 @@ fn feedback_may_add_half_of_the_limits_unless_given() {
         refused("limits", &format!("feedback_scale = {value}"), "must be greater than 0");
     }
     refused("limits", "feedback_scale = nan", "must be a finite number, at most 1e12 in magnitude");
+}
+
+#[test]
+fn the_scale_slows_motions_and_changes_no_other_bound() {
+    let full = deployment("");
+    assert_eq!((full.limits.scale, full.limits.in_force()), (1.0, full.limits.reference));
+    let slow = deployment("[limits]\nscale = 0.05\n");
+    let (position, all) = (slow.limits.in_force().position, full.limits.reference.position);
+    assert_eq!(position.velocity, 0.05 * all.velocity);
+    assert_eq!((position.acceleration, position.jerk), (0.05 * all.acceleration, 0.05 * all.jerk));
+    assert_eq!(slow.limits.in_force().orientation, full.limits.reference.orientation.scaled(0.05));
+    assert_eq!((slow.control, slow.timeouts), (full.control, full.timeouts));
+    assert_eq!(slow.limits, DeploymentLimits { scale: 0.05, ..full.limits });
+    for value in ["0.049", "1.01", "0", "-1"] {
+        refused("limits", &format!("scale = {value}"), "must be in [0.05, 1]");
+    }
+    refused("limits", "scale = \"10 %\"", "must be a number, in [0.05, 1]");
 }
 
 #[test]

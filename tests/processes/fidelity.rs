@@ -19,8 +19,8 @@ fn said(keys: &str) -> String {
 fn the_daemon_chooses_and_says_why() {
     let line = said("fidelity = \"auto\"");
     for words in [
-        "leaving out spin of the legs costs at most 0.00",
-        "of the peak force, tolerance 0.1 %; velocity terms and spin would cost 0.66",
+        "leaving out spin of the legs costs 0.00",
+        "of the peak force, the largest found; tolerance 0.1 %; velocity terms and spin would cost 0.66",
         "extent of the legs would cost",
         "fidelity=\"rigid-legs\"",
     ] {

@@ -19,6 +19,7 @@ use crate::support::turns;
 const SECTIONS: &str = "
 [limits]
 condition = 90.0
+scale = 0.5
 
 [control]
 position_bandwidth_hz = 10.0
@@ -57,10 +58,13 @@ fn gains_limits_and_timeouts_are_taken_over_in_standby_and_not_under_control() {
     let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(machine("reload"));
     let before = in_force(&machine);
     assert_eq!(before, (sha1(&machine), 0.into(), 90.0.into()));
+    let scale = || status(&machine)["status"]["limits_scale"].clone();
+    assert_eq!(scale(), 0.5);
     edit(
         &machine,
         &[
             ("condition = 90.0", "condition = 80.0 # less"),
+            ("scale = 0.5", "scale = 0.1"),
             ("= 10.0", "= 8.0"),
             ("setpoint_ms = 400.0", "setpoint_ms = 300.0"),
         ],
@@ -73,13 +77,14 @@ fn gains_limits_and_timeouts_are_taken_over_in_standby_and_not_under_control() {
     does(&machine, "stop", &[], &["standby"]);
     let Ended { status, stdout, stderr } = ask(&machine, "reload", &[]);
     assert_eq!(status.code(), Some(0), "{stderr}");
-    let changes = "on: timeouts.setpoint_ms: 400.0 -> 300.0; limits.condition: 90.0 -> 80.0; \
+    let changes = "on: timeouts.setpoint_ms: 400.0 -> 300.0; limits.condition: 90.0 -> 80.0; limits.scale: 0.5 -> 0.1; \
                    control.position_bandwidth_hz: 10.0 -> 8.0\n";
     let file = format!("{}, from cycle ", machine.file.display());
     assert!(stdout.starts_with(&file) && stdout.ends_with(changes), "{stdout}");
     daemon.says("request: reload user=root process=");
     daemon.says(&format!("reload: {file}"));
     assert_eq!(in_force(&machine), (sha1(&machine), 1.into(), 80.0.into()));
+    assert_eq!(scale(), 0.1);
     // Once more, without a difference.
     let Ended { stdout, .. } = ask(&machine, "reload", &[]);
     assert!(stdout.ends_with("on: nothing that the daemon reads has changed\n"), "{stdout}");

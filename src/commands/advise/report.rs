@@ -34,7 +34,8 @@ pub struct AdviceReport {
     pub recommended: &'static str,
 }
 
-/// Errors of the force of a leg, absolute and as ratios of the peak force, and the shortest time of an evaluation.
+/// Errors of the force of a leg, absolute and as ratios of the peak force, and the shortest time of an evaluation. The
+/// largest error is the largest found by a search, not a bound.
 #[derive(Clone, Debug, Serialize)]
 pub struct FidelityRow {
     #[serde(serialize_with = "by_name")]
@@ -100,7 +101,10 @@ impl fmt::Display for AdviceReport {
         let [mean, rms, max, mean_share, rms_share, max_share, ns] = header.map(|name| (name, Right));
         let columns =
             [("fidelity", Left), mean, rms, max, mean_share, rms_share, max_share, ns, ("leaves out", Left)];
-        writeln!(f, "\n\nerror of a leg's force [N], and as a share of the peak force [%]:")?;
+        writeln!(
+            f,
+            "\n\nerror of a leg's force [N], and as a share of the peak force [%]; max is the largest found:"
+        )?;
         write!(f, "{}", text_table(1, &columns, self.fidelities.iter().map(FidelityRow::cells)))?;
         self.fmt_recommendation(f)
     }
@@ -115,7 +119,7 @@ impl AdviceReport {
             self.fidelities.iter().find(is_chosen).filter(|row| row.fidelity != Fidelity::Exact)
         {
             let (what, max, share) = (row.leaves_out, significant(row.max_n), percent(row.max_ratio));
-            writeln!(f, "  leaving out {what} costs at most {max} N, {share}")?;
+            writeln!(f, "  leaving out {what} costs {max} N, {share}: the largest found, not a bound")?;
         }
         let kept = self.fidelities.iter().filter(|row| !is_chosen(row) && !row.is_within_tolerance);
         for row in kept.rev() {

@@ -9,6 +9,7 @@ use crate::commands::failure::Failure;
 use crate::output::files::{print, print_json};
 
 mod drawing;
+mod limits;
 mod report;
 mod text;
 

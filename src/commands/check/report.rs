@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::limits::{ExceedableRange, MotionLimits, exceedable_ranges};
 use crate::analysis::assembly_modes::other_modes;
 use crate::config::control_loops::{ControlLoop, longest_age_s, loops};
 use crate::config::deployment::default_limits::{DerivedLimit, derived_limits};
@@ -40,6 +41,10 @@ pub struct CheckReport {
     /// Other poses with the same lengths, and the nearest.
     pub other_poses: usize,
     pub nearest_pose: Option<OtherPose>,
+    /// Limits that the reference keeps.
+    pub motion_limits: MotionLimits,
+    /// Ranges of `[envelope]` that are below them.
+    pub exceedable_ranges: Vec<ExceedableRange>,
     /// Default limits that are less than usual, because the drives cannot give more.
     pub derived_limits: Vec<DerivedLimit>,
     pub control_mode: &'static str,
@@ -96,7 +101,7 @@ impl CheckReport {
     /// Evaluates the model at home, at rest.
     pub fn new(config: &Config, examination: &Examination) -> Self {
         let Config { name, machine, deployment, .. } = config;
-        let control = &deployment.control;
+        let (control, limits) = (&deployment.control, &deployment.limits);
         let kinematic_state = KinematicState::new(machine, machine.home_pose());
         let sensitivity = kinematic_state.sensitivity();
         let others = other_modes(machine, &kinematic_state);
@@ -112,7 +117,7 @@ impl CheckReport {
             warnings: examination.warnings.clone(),
             legs: legs(config),
             condition: sensitivity.condition,
-            condition_limit: deployment.limits.condition,
+            condition_limit: limits.condition,
             rate_hz: deployment.realtime.rate_hz,
             certain_step_m: sensitivity.trusted_step * machine.joints.radius,
             certain_step_rad: sensitivity.trusted_step,
@@ -120,7 +125,11 @@ impl CheckReport {
             nearest_pose: others
                 .first()
                 .map(|mode| OtherPose { text: mode.to_string(), is_nearby: mode.is_nearby() }),
-            derived_limits: derived_limits(machine, &deployment.limits.reference),
+            motion_limits: MotionLimits::new(limits),
+            exceedable_ranges: deployment
+                .envelope
+                .map_or_else(Vec::new, |envelope| exceedable_ranges(&envelope, &limits.in_force())),
+            derived_limits: derived_limits(machine, &limits.reference),
             control_mode: control.mode.name(),
             estimator_hz: control.estimator_bandwidth_hz,
             compensates_disturbances: control.compensate_disturbances,
@@ -129,7 +138,7 @@ impl CheckReport {
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_age_s(deployment),
-            held_pole_per_s: deployment.limits.held_pole,
+            held_pole_per_s: limits.held_pole,
         }
     }
 }

@@ -26,9 +26,9 @@ impl fmt::Display for CheckReport {
         )?;
         self.fmt_modes(f)?;
         self.fmt_loops(f)?;
-        for limit in &self.derived_limits {
-            writeln!(f, "{limit}")?;
-        }
+        writeln!(f, "{}", self.motion_limits)?;
+        self.derived_limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
+        self.exceedable_ranges.iter().try_for_each(|range| writeln!(f, "{range}"))?;
         self.warnings.iter().try_for_each(|warning| writeln!(f, "WARNING: {warning}"))
     }
 }

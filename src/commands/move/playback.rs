@@ -52,7 +52,7 @@ enum Phase {
 /// State of the playback of one trajectory.
 pub(super) struct Playback<'a> {
     machine: &'a Machine,
-    limits: &'a Limits,
+    limits: Limits,
     trajectory: &'a Trajectory,
     statuses: Subscriber<StatusMessage>,
     engagement: Engagement,
@@ -76,10 +76,9 @@ impl<'a> Playback<'a> {
         engagement: Engagement,
     ) -> Self {
         let Config { machine, deployment, .. } = config;
-        let limits = &deployment.limits.reference;
         Self {
             machine,
-            limits,
+            limits: deployment.limits.in_force(),
             trajectory,
             statuses,
             engagement,
@@ -143,7 +142,7 @@ impl<'a> Playback<'a> {
             }
             Phase::Paused(path, t) if !is_to_pause => {
                 info!("resumed");
-                self.phase = Phase::Playing(path.resumed(*t, self.limits, self.trajectory), now_ns);
+                self.phase = Phase::Playing(path.resumed(*t, &self.limits, self.trajectory), now_ns);
             }
             Phase::Waiting | Phase::Standing(_) if has_changed => {
                 info!("{}", if is_to_pause { "paused: the motion will not begin" } else { "resumed" });
@@ -154,7 +153,7 @@ impl<'a> Playback<'a> {
 
     fn slowing(&self, path: Path, since_ns: u64, now_ns: u64) -> Phase {
         let t = seconds(since_ns, now_ns);
-        let slowdown = RateChange::to_rest(t, self.limits, |t| path.at(t, self.trajectory));
+        let slowdown = RateChange::to_rest(t, &self.limits, |t| path.at(t, self.trajectory));
         let then = if self.is_ending { "once more ends at once" } else { "hexad move --resume goes on" };
         info!("slowing down along the path, within {:.1} s; {then}", slowdown.duration_s);
         Phase::Slowing(path, slowdown, now_ns)
@@ -196,7 +195,7 @@ impl<'a> Playback<'a> {
     fn timeline(&self, from: &Vector6<f64>) -> Timeline {
         let to = self.trajectory.at(0.0).x;
         let timeline = Timeline::new(self.machine, from, &to, self.trajectory.duration());
-        timeline.with_shortest_approach(approach_s(self.limits, from, &to))
+        timeline.with_shortest_approach(approach_s(&self.limits, from, &to))
     }
 
     /// Under control: ends after an operator's request, starts again after a fault.

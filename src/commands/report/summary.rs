@@ -30,6 +30,7 @@ pub fn facts(run: &Run) -> Vec<Fact> {
         info.version, info.fidelity, info.instruction_set
     );
     let mut facts = live_facts(config, history, &history.times());
+    facts.extend(scaled_limits(config));
     facts.extend(configurations(run));
     facts.extend([lost(history), Fact { name: "Software", text: software, is_bad: false }]);
     facts
@@ -100,6 +101,13 @@ fn times_in_words([wakeup, compute]: &[Times; 2]) -> String {
         format!("{p50:.1} / {p99:.1} / {max:.1} µs")
     };
     format!("p50 / p99 / largest: wake-up {}, computation {}", words(wakeup), words(compute))
+}
+
+/// `limits.scale` at the begin of the run, if it is less than 1.
+fn scaled_limits(config: &Config) -> Option<Fact> {
+    let scale = config.deployment.limits.scale;
+    let text = format!("velocity, acceleration and jerk times {scale} (limits.scale)");
+    (scale < 1.0).then_some(Fact { name: "Limits", text, is_bad: false })
 }
 
 /// Changes of the configuration, if there are any.

@@ -65,7 +65,9 @@ fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     let timing = &report.timing;
     let limits =
         if report.active_limits.is_empty() { "none".into() } else { report.active_limits.join(", ") };
-    writeln!(f, "{:.80}", format!("limits    {limits}"))?;
+    let scale =
+        report.limits_scale.map_or_else(String::new, |scale| format!("scale {scale}, reached or near: "));
+    writeln!(f, "{:.80}", format!("limits    {scale}{limits}"))?;
     writeln!(
         f,
         "cycles    {} at {} Hz; late {}, overruns {}, skipped {}",
@@ -214,6 +216,7 @@ pub(in crate::commands) mod tests {
                 loaded_unix_s: 0,
             },
             age_s: Some(0.0011),
+            limits_scale: Some(0.123_456_789),
             active_limits: [
                 "force",
                 "force rate",

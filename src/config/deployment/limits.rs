@@ -32,12 +32,17 @@ const MIN_CONDITION_PER_HOME: f64 = 1.5;
 /// Default of the distance from the ends of the stroke, as a ratio of the stroke: many times the following
 /// error of a faultless machine.
 const DEFAULT_STROKE_MARGIN_RATIO: f64 = 0.005;
+/// Smallest and largest `scale`. With the default `autonomous_scale` the smallest leaves a hundredth of the limits to
+/// autonomous motions.
+const SCALE_BOUND: Bound = Bound::Within(0.05, 1.0);
 
 /// Section `[limits]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeploymentLimits {
-    /// Limits of setpoints and of autonomous motions of the daemon.
+    /// Limits of setpoints and of autonomous motions of the daemon, before `scale`.
     pub reference: ReferenceLimits,
+    /// Factor on velocity, acceleration and jerk of the reference, for commissioning and for people on the platform.
+    pub scale: f64,
     /// Acceleration that feedback may add to the limits, as a ratio of them.
     pub feedback_scale: f64,
     /// Change of the payload under control that is no fault \[kg\]; `None`: the default of the machine.
@@ -55,6 +60,14 @@ pub struct DeploymentLimits {
     pub held_pole: f64,
 }
 
+impl DeploymentLimits {
+    /// Limits that the reference keeps. Checks of the machine, feedback and monitoring use `reference`: `scale`
+    /// changes neither the validity of a file nor the size of disturbances.
+    pub fn in_force(&self) -> ReferenceLimits {
+        self.reference.scaled(self.scale)
+    }
+}
+
 /// Reads the section. Autonomous motions use a fifth of the limits.
 pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Realtime) -> DeploymentLimits {
     let default = DefaultLimits::new(machine);
@@ -66,6 +79,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     };
     let position = of(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], default.position);
     let orientation = of(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], default.orientation);
+    let scale = section.number_or("scale", 1.0, SCALE_BOUND);
     let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
@@ -81,6 +95,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     section.finish();
     DeploymentLimits {
         reference,
+        scale,
         feedback_scale,
         payload_change_kg,
         disturbance_step_m_s2,

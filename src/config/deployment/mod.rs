@@ -143,7 +143,7 @@ fn timeouts(
     timeouts
 }
 
-/// Reads `[envelope]`: all four keys, or none.
+/// Reads `[envelope]`: all four keys, or none. The reference keeps its poses; velocity and acceleration are requirements.
 fn envelope(mut section: SectionReader) -> Option<envelope::EnvelopeBounds> {
     let pose = |angle: Bound, position: Bound| [angle, angle, angle, position, position, position];
     let keys = [

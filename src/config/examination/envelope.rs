@@ -83,7 +83,7 @@ fn examine_motion(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
             examiner.warn(
                 key,
                 value,
-                format!("{limited} is {limit}: the drives cannot give all of it at once"),
+                format!("{limited} is {limit}: the drives cannot give all that is required at once"),
             );
         }
     }

@@ -113,7 +113,7 @@ impl DisturbanceBounds {
         friction: f64,
         arm: f64,
     ) -> Self {
-        let Parameters { law, limits, payload_change_kg, disturbance_step, .. } = parameters;
+        let Parameters { law, payload_change_kg, disturbance_step, .. } = parameters;
         let ReadingErrors { deviation: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
         let has_weight = expects_forces && machine.gravity.norm_squared() > 0.0;
@@ -124,7 +124,8 @@ impl DisturbanceBounds {
         let largest_lift_kg = machine.actuator.max_force * by_legs;
         let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass)
             .max(DEFAULT_PAYLOAD_CHANGE_PER_LIFT * largest_lift_kg);
-        let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT * limits.position.acceleration)
+        let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT
+            * parameters.unscaled_limits().position.acceleration)
             .max(DEFAULT_IMPACT_PER_FRICTION * friction);
         let softest = law.position.stiffness.min(law.orientation.stiffness);
         let softness = (SWING_STIFFNESS / softest).max(1.0);

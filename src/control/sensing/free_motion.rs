@@ -22,7 +22,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
-use crate::control::parameters::Parameters;
 use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::sensing::standstill::{Standstill, standing_speed};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -136,8 +135,8 @@ impl FreeMotion {
         let moves_s = if change < 0.0 { age_s.min(last.speed / -change) } else { age_s };
         let share = if last.speed > 0.0 { (1.0 + change * moves_s / last.speed).max(0.0) } else { 0.0 };
         let scaled = |factor: f64| Twist::from_vector(&(last.twist.vector() * factor));
-        let Parameters { limits, period_ns, .. } = &constants.parameters;
-        let in_period = scaled(change / last.speed * *period_ns as f64 * 1e-9);
+        let limits = constants.parameters.unscaled_limits();
+        let in_period = scaled(change / last.speed * constants.parameters.period_ns as f64 * 1e-9);
         let change_ratio = largest_ratio([
             in_period.linear.norm() / limits.position.velocity,
             in_period.angular.norm() / limits.orientation.velocity,

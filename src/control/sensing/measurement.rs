@@ -226,7 +226,7 @@ fn check_rate_jump_and_consistency(
     consistency: &mut RateConsistency,
 ) -> Result<(), Diagnostic> {
     let actuator = &cycle.constants.machine().actuator;
-    let limits = &cycle.constants.parameters.limits;
+    let limits = cycle.constants.parameters.unscaled_limits();
     let acceleration =
         MIN_ACCELERATION_BOUND_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
     let bound = acceleration * bounded_dt_s + PLAUSIBLE_RATE_CHANGE_RATIO * actuator.max_rate;

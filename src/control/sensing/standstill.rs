@@ -42,7 +42,7 @@ const STANDING_RATIO: f64 = 1e-3;
 
 /// Largest speed of a joint at which the platform counts as standing \[m/s\].
 pub(in crate::control) fn standing_speed(parameters: &Parameters) -> f64 {
-    STANDING_RATIO * parameters.limits.position.velocity
+    STANDING_RATIO * parameters.unscaled_limits().position.velocity
 }
 
 /// Length of the window in which the rate is certain with the stated noise \[s\].

@@ -7,9 +7,9 @@
 //! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | the reference stops before it |
 //! | 3 | leg rate | `actuator.max_rate_m_s` | kept by the reference |
 //! | 4 | envelope | `[envelope]` | the reference stops before it |
-//! | 5 | velocity | `limits.velocity_*` | kept by the reference |
-//! | 6 | acceleration | `limits.acceleration_*` | kept by the reference |
-//! | 7 | jerk | `limits.jerk_*` | kept by the reference |
+//! | 5 | velocity | `limits.velocity_*` times `limits.scale` | kept by the reference |
+//! | 6 | acceleration | `limits.acceleration_*` times `limits.scale` | kept by the reference |
+//! | 7 | jerk | `limits.jerk_*` times `limits.scale` | kept by the reference |
 //! | 8 | following error | `control.following_*`, of pose and velocity | fault |
 //! | 9 | condition | `limits.condition` | the reference stops before it; platform beyond it: stop, fault |
 //!
@@ -39,11 +39,11 @@ pub enum Limit {
     LegRate = 3,
     /// Range of X, `[envelope]` \[rad\], \[m\].
     Envelope = 4,
-    /// Velocity of the platform, `limits.velocity_*` \[rad/s\], \[m/s\].
+    /// Velocity of the platform, `limits.velocity_*` times `limits.scale` \[rad/s\], \[m/s\].
     Velocity = 5,
-    /// Acceleration of the platform, `limits.acceleration_*` \[rad/s^2\], \[m/s^2\].
+    /// Acceleration of the platform, `limits.acceleration_*` times `limits.scale` \[rad/s^2\], \[m/s^2\].
     Acceleration = 6,
-    /// Jerk of the platform, `limits.jerk_*` \[rad/s^3\], \[m/s^3\].
+    /// Jerk of the platform, `limits.jerk_*` times `limits.scale` \[rad/s^3\], \[m/s^3\].
     Jerk = 7,
     /// Following error under control, `control.following_*` \[rad\], \[m\].
     Following = 8,

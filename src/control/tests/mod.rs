@@ -98,6 +98,7 @@ pub(in crate::control) fn parameters(machine: &Machine) -> Parameters {
         force_delay_ns: 0,
         fidelity: Fidelity::Exact,
         limits: LIMITS,
+        limits_scale: 1.0,
         envelope: None,
         condition: 60.0,
         force_rate: 1e6,

@@ -105,6 +105,7 @@ impl StatusSource {
                 reloads: self.reloads,
             },
             age_s: (snapshot.time_ns > 0).then(|| seconds(snapshot.time_ns, now_ns)),
+            limits_scale: Some(deployment.limits.scale),
             active_limits: limits.map(|limit| limit.name().into()).collect(),
             timing: timing(snapshot, deployment.realtime.rate_hz),
             pose: is_known.then_some(status.x),
