@@ -1,4 +1,5 @@
-//! Clearance of sets of poses: every leg within its stroke, on home's side of singular poses, no condition beyond a limit.
+//! Clearance of sets of poses: every leg within its stroke and away from the first axis of its universal joint, on home's side
+//! of singular poses, no condition beyond a limit, and drives that can hold the platform.
 //! Proved for a whole cell of poses at once, not sampled: a singular surface has no thickness and passes between any
 //! samples.
 //!
@@ -24,6 +25,9 @@
 //! |n''| <= (a (t^2 + t'^2) + 3 s^2 / l) / l,  l = L0 - s       |m''| / r <= (a' / r) (t^2 + t'^2 + 2 t s / l + |n''|)
 //! ```
 //!
+//! Sine of the angle to the axis of a universal joint: at least that of the middle less q. Force that holds the platform: see
+//! [`crate::model::force_changes`].
+//!
 //! Cells that cover a region around home and all pass have the sign of home's determinant everywhere.
 //!
 //! Rounding, 1e-15 of the lengths, is not accounted for. Collisions of legs and joint angles are not part of it.
@@ -31,8 +35,13 @@
 use nalgebra::{Matrix6, Vector3};
 
 use super::region_shape::{PoseCell, RegionShape, turned};
+use crate::analysis::drive_capability::DriveCapability;
+use crate::control::constants::{MAX_HOLDING_SHARE, least_universal_sine};
 use crate::model::LEGS;
-use crate::model::inverse_geometry::leg_lengths;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::conditioning::Conditioning;
+use crate::model::force_changes::{ForceChangeBounds, LargestMotion};
+use crate::model::inverse_geometry::{leg_lengths, universal_sine};
 use crate::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
@@ -53,6 +62,10 @@ pub enum WorkspaceLimit {
     Singular,
     /// The condition exceeds its limit.
     Condition,
+    /// A leg is too near to the first axis of its universal joint.
+    UniversalJoint,
+    /// A leg, counted from 0, needs too much force to hold the platform.
+    HoldingForce(usize),
 }
 
 /// Machine with the limits of its workspace.
@@ -62,6 +75,9 @@ pub struct Clearance<'a> {
     home: Pose,
     home_determinant: f64,
     largest_condition: f64,
+    least_universal_sine: f64,
+    dynamics: InverseDynamics,
+    force_changes: ForceChangeBounds,
     /// Lengths of the arms of the joints on the platform: from C, and from their mean in radii.
     arms: [(f64, f64); LEGS],
     /// The joints on the platform and their mean, in platform axes.
@@ -76,10 +92,14 @@ impl<'a> Clearance<'a> {
         let joints = &machine.joints;
         let platform = joints.triples.unpack_vectors(&joints.platform);
         let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
+        let at_home = KinematicState::new(machine, home);
         Self {
             machine,
             home,
-            home_determinant: KinematicState::new(machine, home).sensitivity().determinant,
+            home_determinant: at_home.sensitivity().determinant,
+            least_universal_sine: least_universal_sine(machine, &at_home),
+            dynamics: InverseDynamics::new(machine),
+            force_changes: ForceChangeBounds::new(machine),
             largest_condition,
             arms: platform.map(|arm| (arm.norm(), (arm - mean).norm() / joints.radius)),
             joints: platform,
@@ -151,7 +171,35 @@ impl<'a> Clearance<'a> {
         if !(sensitivity.determinant * self.home_determinant > 0.0) {
             return Some(WorkspaceLimit::Singular);
         }
-        (!(sensitivity.condition <= self.largest_condition)).then_some(WorkspaceLimit::Condition)
+        if !(sensitivity.condition <= self.largest_condition) {
+            return Some(WorkspaceLimit::Condition);
+        }
+        if !(universal_sine(self.machine, pose) >= self.least_universal_sine) {
+            return Some(WorkspaceLimit::UniversalJoint);
+        }
+        let (leg, force) = DriveCapability::of(&self.dynamics, pose)?.hardest_held();
+        (!(force <= self.holding_force())).then_some(WorkspaceLimit::HoldingForce(leg))
+    }
+
+    fn holding_force(&self) -> f64 {
+        MAX_HOLDING_SHARE * self.machine.actuator.max_force
+    }
+
+    /// Whether a proof exists that in a cell no leg is near the first axis of its universal joint, and that the drives can hold
+    /// the platform. `turned_leg`, `change` and `left` are the largest q and D, and `1 - f`.
+    fn is_held(&self, pose: &Pose, turn: f64, turned_leg: f64, change: f64, left: f64) -> bool {
+        let middle = Conditioning::new(&self.dynamics, pose);
+        let Some(loads) = middle.loads else { return false };
+        let forces = loads.holding(self.machine);
+        let largest = forces.into_iter().map(f64::abs).fold(0.0, f64::max);
+        let norm = forces.into_iter().map(|force| force * force).sum::<f64>().sqrt();
+        let (at_rest, axial_norm) = (
+            self.force_changes.at_rest(turn, turned_leg),
+            self.force_changes.axial_norm(&LargestMotion::default()),
+        );
+        let wrench = at_rest.wrench + change * (norm + axial_norm);
+        middle.universal_sine - turned_leg >= self.least_universal_sine
+            && largest + middle.largest_row / left * wrench + at_rest.axial <= self.holding_force()
     }
 
     /// Lower bound of [`Clearance::margin`] anywhere in a cell.
@@ -181,13 +229,14 @@ impl<'a> Clearance<'a> {
         margins.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a proof exists that no pose of a cell is singular or has a condition beyond the limit.
+    /// Whether a proof exists that no pose of a cell is singular, has a condition beyond the limit or a leg near the first axis of
+    /// its universal joint, and that the drives can hold the platform.
     pub fn is_regular(&self, shape: &RegionShape, cell: &PoseCell) -> bool {
         let kinematic_state = KinematicState::new(self.machine, self.pose(shape, &cell.middle));
         let [ha, hb, hc, hx, hy, hz] = cell.half;
         let (shift, turn) = (Vector3::new(hx, hy, hz).norm(), cell.turn());
         let turns_squared = turn * turn + ha * hb + (ha + hb) * hc;
-        let (mut change, mut bent) = (0.0, 0.0);
+        let (mut change, mut bent, mut turned_leg) = (0.0, 0.0, 0.0_f64);
         for (length, (arm, arm_share)) in kinematic_state.lengths(self.machine).into_iter().zip(self.arms) {
             let moved = shift + arm * turn;
             let shortest = length - moved;
@@ -195,6 +244,7 @@ impl<'a> Clearance<'a> {
                 return false;
             }
             let turned = moved / (length * shortest).sqrt();
+            turned_leg = turned_leg.max(turned);
             change += turned * turned + (arm_share * (turn + turned)).powi(2);
             let second = (arm * turns_squared + 3.0 * moved * moved / shortest) / shortest;
             let second_moment = arm_share * (turns_squared + 2.0 * turn * moved / shortest + second);
@@ -205,10 +255,12 @@ impl<'a> Clearance<'a> {
         let norm = wrenches.norm();
         let inverse = kinematic_state.sensitivity().condition / norm;
         let most = (norm + change).min(MAX_WRENCH_NORM) * inverse / self.largest_condition;
-        let holds = |share: f64| most <= 1.0 - share;
+        let holds = |share: f64| {
+            most <= 1.0 - share && self.is_held(kinematic_state.pose(), turn, turned_leg, change, 1.0 - share)
+        };
         // The second bound takes ten times as long: only where it can succeed.
         holds(inverse * change)
-            || holds(inverse * (bent + change * MIN_LINEAR_SHARE))
+            || most <= 1.0 - inverse * (bent + change * MIN_LINEAR_SHARE)
                 && self
                     .linear_change(shape, cell, &kinematic_state, &wrenches)
                     .is_some_and(|linear| holds(linear + inverse * bent))

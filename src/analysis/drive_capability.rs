@@ -52,7 +52,13 @@ struct LegLoad {
 impl DriveCapability {
     /// Drives at a pose; `None` where it is singular.
     pub fn new(machine: &Machine, pose: &Pose) -> Option<Self> {
-        let found = DriveLoads::new(&InverseDynamics::new(machine), pose)?;
+        Self::of(&InverseDynamics::new(machine), pose)
+    }
+
+    /// Drives of a model at a pose; `None` where it is singular.
+    pub fn of(dynamics: &InverseDynamics, pose: &Pose) -> Option<Self> {
+        let machine = dynamics.machine();
+        let found = DriveLoads::new(dynamics, pose)?;
         let [ax, ay, az, x, y, z] = found.by_acceleration(machine).map(Vector6::from);
         let norms = |a: &Vector6<f64>, b: &Vector6<f64>, c: &Vector6<f64>| -> [f64; LEGS] {
             (a.component_mul(a) + b.component_mul(b) + c.component_mul(c)).map(f64::sqrt).into()

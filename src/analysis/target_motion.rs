@@ -174,7 +174,7 @@ pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBoun
     bounds.push(WorkspaceBound { quantity, value: condition, bound: largest, margin: largest - condition });
     let (quantity, bound) = (BoundedQuantity::UniversalSine, constants.universal_sine);
     bounds.push(WorkspaceBound { quantity, value: sine, bound, margin: sine - bound });
-    let drives = DriveCapability::new(machine, pose).map(|drives| drives.hardest_held());
+    let drives = DriveCapability::of(&constants.dynamics, pose).map(|drives| drives.hardest_held());
     let (leg, force) = drives.unwrap_or((0, f64::INFINITY));
     let (quantity, bound) =
         (BoundedQuantity::HoldingForce(leg), MAX_HOLDING_SHARE * machine.actuator.max_force);

@@ -138,12 +138,12 @@ impl Constants {
 }
 
 /// Largest condition of the reference: a part of the way from that at home to the limit of the platform.
-fn max_reference_condition(home: &KinematicState, limit: f64) -> f64 {
+pub fn max_reference_condition(home: &KinematicState, limit: f64) -> f64 {
     let at_home = home.sensitivity().condition;
     at_home + REFERENCE_CONDITION_RANGE_SHARE * (limit - at_home)
 }
 
 /// Least sine of the angle between a leg and the first axis of its universal joint that the reference keeps.
-fn least_universal_sine(machine: &Machine, home: &KinematicState) -> f64 {
+pub fn least_universal_sine(machine: &Machine, home: &KinematicState) -> f64 {
     MIN_UNIVERSAL_SINE.min(MIN_UNIVERSAL_SINE_PER_HOME * universal_sine(machine, home.pose()))
 }

@@ -12,8 +12,8 @@
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
-use fearless_simd::{Simd, dispatch, f64x4, f64x8, prelude::*};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
+use nalgebra::{Matrix6, Vector6};
 
 use super::LEGS;
 use super::factorization::{Factorization, LaneWrench, wrench_columns};
@@ -22,7 +22,6 @@ use super::fidelity::{
 };
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
-use super::lanes3::Lanes3;
 use super::leg::{JointForces, LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
@@ -178,15 +177,9 @@ impl InverseDynamics {
         [x, y, z]
     }
 
-    /// Torques of the platform's rotation per unit of the angular acceleration about an axis; their sum counts.
-    #[inline(always)]
-    pub(super) fn platform_torques<S: Simd>(
-        &self,
-        simd: S,
-        rotation: &Matrix3<f64>,
-        axis: &Vector3<f64>,
-    ) -> Lanes3<f64x4<S>> {
-        self.axes.torques(simd, rotation, &axis.cross_matrix())
+    /// Principal axes of the platform.
+    pub(super) fn axes(&self) -> &PrincipalAxes {
+        &self.axes
     }
 
     /// Drive force `reflected L'' + viscous L' + coulomb sign(L')`; the sign is proportional below the

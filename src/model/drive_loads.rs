@@ -66,17 +66,17 @@ impl DriveLoads {
         let [x, y, z] = dynamics.joint_masses(simd, legs);
         let [mx, my, mz] = [&x, &y, &z].map(|column| column.transverse);
         let arm = legs.arm + Lanes3::splat(simd, &(pose.rotation * dynamics.joints().center));
-        let zero = Vector3::zeros();
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z(), zero, zero, zero];
+        let zero = Lanes3::splat(simd, &Vector3::zeros());
+        let [tx, ty, tz] = dynamics.axes().inertia(simd, &pose.rotation);
+        let turning = [tx, ty, tz, zero, zero, zero];
         // Forces at the joints for `e x b` with each axis e, then for each axis.
         let transverse =
             [mz * arm.y - my * arm.z, mx * arm.z - mz * arm.x, my * arm.x - mx * arm.y, mx, my, mz];
         let [ax, ay, az] = [x.axial, y.axial, z.axial];
         let axial = [az * arm.y - ay * arm.z, ax * arm.z - az * arm.x, ay * arm.x - ax * arm.y, ax, ay, az];
         let mut by_acceleration = [LegLanes::default(); LEGS];
-        let columns = by_acceleration.iter_mut().zip(&axes).zip(transverse.into_iter().zip(axial));
-        for ((column, axis), (transverse, axial)) in columns {
-            let turning = dynamics.platform_torques(simd, &pose.rotation, axis);
+        let columns = by_acceleration.iter_mut().zip(turning).zip(transverse.into_iter().zip(axial));
+        for ((column, turning), (transverse, axial)) in columns {
             let wrench = LaneWrench {
                 torque: legs.arm.cross(transverse).folded() + turning,
                 force: transverse.folded(),

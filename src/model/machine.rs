@@ -95,6 +95,14 @@ pub struct Joints {
 }
 
 impl Machine {
+    /// Machine whose stroke is shorter at both ends by a margin \[m\].
+    pub fn within_margin(&self, margin: f64) -> Self {
+        let mut machine = self.clone();
+        machine.actuator.min_length += margin;
+        machine.actuator.max_length -= margin;
+        machine
+    }
+
     /// Home pose.
     pub fn home_pose(&self) -> Pose {
         TaskState::at_rest(self.home).motion().pose

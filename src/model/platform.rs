@@ -52,6 +52,17 @@ impl PrincipalAxes {
         let p = Lanes3 { x, y, z }.transformed(simd, rotation);
         p.cross(p.transformed(simd, acceleration_map))
     }
+
+    /// The same per unit of the angular acceleration about x, y and z, from rest: columns of `|p_k|^2 - p_k p_k^T`.
+    #[inline(always)]
+    pub fn inertia<S: Simd>(&self, simd: S, rotation: &Matrix3<f64>) -> [Lanes3<f64x4<S>>; 3] {
+        let [x, y, z] = self.0.map(|row| f64x4::load_array(simd, row));
+        let p = Lanes3 { x, y, z }.transformed(simd, rotation);
+        let square = p.dot(p);
+        let [mut x, mut y, mut z] = [p * -p.x, p * -p.y, p * -p.z];
+        (x.x, y.y, z.z) = (x.x + square, y.y + square, z.z + square);
+        [x, y, z]
+    }
 }
 
 /// Matrix S, which takes a point of the platform (from C, in base axes) to its acceleration relative to C.

@@ -37,12 +37,17 @@ fn at(home: &[f64; 6], sines: &Sines, t: f64) -> TaskState {
     task
 }
 
+/// A machine whose drives hold the platform at every wall. Weak poses are a bound of their own, see `weak_poses`.
+fn with_strong_drives(machine: &str) -> Config {
+    let mut config = Config::load(&data(machine, "toml")).unwrap();
+    config.machine.actuator.max_force *= 100.0;
+    config
+}
+
 /// Once the wall is reached: RMS jerk of translation and rotation over the limits, and how often per second one of them turns back from
 /// more than half of its limit to as much. And the largest values of the run.
 fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines) -> ([f64; 2], f64, Largest) {
-    let mut config = Config::load(&data(machine, "toml")).unwrap();
-    // The drives hold the platform at every wall: what is weak is a bound of its own, see `weak_poses`.
-    config.machine.actuator.max_force *= 10.0;
+    let config = with_strong_drives(machine);
     let mut parameters = parameters(&config);
     parameters.on_violation = ViolationPolicy::Limit;
     parameters.period_ns = 1_000_000_000 / rate_hz;
@@ -140,7 +145,7 @@ fn certificate_a_platform_pressed_into_any_corner_comes_back() {
     let directions: Vec<Vector6<f64>> = along.chain(others).collect();
     let mut failures = Vec::new();
     for machine in ["motion_base", "fried2008", "tsai2000"] {
-        let config = Config::load(&data(machine, "toml")).unwrap();
+        let config = with_strong_drives(machine);
         for policy in [ViolationPolicy::Limit, ViolationPolicy::Stop] {
             let parameters = Parameters { on_violation: policy, ..parameters(&config) };
             let constants = Constants::new(&config.machine, parameters);

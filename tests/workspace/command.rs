@@ -122,7 +122,7 @@ fn what_is_asked_for_wrongly_is_refused() {
     refused(&["--through", "0,0,0,0,0,NaN"], &["must be six numbers"]);
     refused(&["--through", "0,0,0,0,0,1.9"], &["--through 0,0,0,0,0,1.9: must be a pose", "too long"]);
     refused(&["--through", "0,0,0,0,0,-1.25"], &["across a singular pose"]);
-    refused(&["--through", "0,0,0,0,0,0.02"], &["the condition is beyond 100"]);
+    refused(&["--through", "0,0,0,0,0,0.02"], &["the condition is beyond 86.0"]);
     let file = folder.path().with_extension("file");
     fs::write(&file, "").unwrap();
     let ended = workspace("motion_base", &file, &["--resolution", "11"]);

@@ -140,6 +140,7 @@ fn a_singular_surface_between_samples_is_found() {
     let text = std::fs::read_to_string(data("motion_base", "toml")).unwrap();
     let text = text
         .replace("pose = [0.0, 0.0, 0.0,", &format!("pose = [0.0, 0.0, {},", 80_f64.to_radians()))
+        .replace("max_force_n = 20000.0", "max_force_n = 2e9")
         .replace("min_length_m = 1.1\nmax_length_m = 2.3", "min_length_m = 0.5\nmax_length_m = 4.0");
     let config = Config::parse(&(text + "\n[limits]\ncondition = 1e6\n"), "turned.toml").unwrap();
     let mut high = [0.0; 6];

@@ -20,6 +20,8 @@ use crate::analysis::reachable_envelope;
 use crate::analysis::region_search::{MAX_CELLS, RegionBounds, largest_region};
 use crate::analysis::region_shape::RegionShape;
 use crate::config::Config;
+use crate::control::constants::{MAX_HOLDING_SHARE, max_reference_condition};
+use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::output::files::{FileError, print, print_json};
@@ -125,8 +127,10 @@ impl WorkspaceReport {
     /// Evaluates the slices, searches the regions, writes the files.
     pub fn new(config: &Config, query: &WorkspaceQuery) -> Result<Self, WorkspaceError> {
         let Config { name, machine, deployment, .. } = config;
-        let largest_condition = deployment.limits.condition;
-        let clearance = Clearance::new(machine, largest_condition);
+        let reachable = machine.within_margin(deployment.limits.stroke_margin_m);
+        let home = KinematicState::new(machine, machine.home_pose());
+        let largest_condition = max_reference_condition(&home, deployment.limits.condition);
+        let clearance = Clearance::new(&reachable, largest_condition);
         let through = query.through.unwrap_or(machine.home);
         if let Some(obstacle) = clearance.violation_at(&TaskState::at_rest(through).motion().pose) {
             let obstacle = ObstacleText { obstacle, largest_condition };
@@ -140,11 +144,11 @@ impl WorkspaceReport {
         let slices = slices(machine, effort, query, through);
         let envelope = deployment.envelope.filter(has_extent);
         let shape = envelope.unwrap_or_else(|| reachable_envelope::nominal_bounds(machine));
-        let regions = regions(machine, &clearance, query.turn_deg.to_radians(), &shape);
+        let regions = regions(&reachable, &clearance, query.turn_deg.to_radians(), &shape);
         let [ball, ..] = &regions;
         let drawing = MapDrawing { name, machine, largest_condition, ball: ball.guaranteed };
         let files = write(&drawing, &slices, &query.output)?;
-        let slices = slices.iter().map(|slice| SliceReport::new(slice, largest_condition)).collect();
+        let slices = slices.iter().map(|slice| SliceReport::new(slice, &clearance)).collect();
         let report = Self {
             schema: SCHEMA,
             machine: name.clone(),
@@ -220,6 +224,15 @@ impl fmt::Display for ObstacleText {
             WorkspaceLimit::LegTooShort(leg) => write!(f, "leg {} is too short", leg + 1),
             WorkspaceLimit::LegTooLong(leg) => write!(f, "leg {} is too long", leg + 1),
             WorkspaceLimit::Singular => write!(f, "it is across a singular pose"),
+            WorkspaceLimit::UniversalJoint => {
+                write!(f, "a leg is too near to the first axis of its universal joint")
+            }
+            WorkspaceLimit::HoldingForce(leg) => write!(
+                f,
+                "leg {} needs more than {:.0} % of actuator.max_force_n to hold the platform",
+                leg + 1,
+                100.0 * MAX_HOLDING_SHARE
+            ),
             WorkspaceLimit::Condition => {
                 write!(f, "the condition is beyond {}", significant(self.largest_condition))
             }

@@ -7,12 +7,15 @@ use serde::Serialize;
 
 use super::ObstacleText;
 use super::slice::Slice;
+use crate::analysis::clearance::Clearance;
 use crate::analysis::drive_capability::DriveCapability;
 use crate::analysis::envelope::EnvelopeBounds;
 use crate::analysis::pose_quality::PoseQuality;
 use crate::analysis::region_search::RegionBounds;
+use crate::control::constants::MAX_HOLDING_SHARE;
 use crate::model::machine::Machine;
 use crate::model::sensitivity::CONDITION_MEANING;
+use crate::model::task::TaskState;
 use crate::output::numbers::{AXES, axis_unit, significant};
 use crate::output::text_table::{Left, Right, paragraph, text_table};
 
@@ -79,19 +82,22 @@ pub struct BoxRange {
 }
 
 impl SliceReport {
-    pub fn new(slice: &Slice, condition_limit: f64) -> Self {
-        let in_reach = slice.qualities.iter().filter(|quality| quality.within_reach());
-        let usable = in_reach.clone().filter(|quality| quality.condition <= condition_limit);
+    pub fn new(slice: &Slice, clearance: &Clearance) -> Self {
+        let in_reach = slice.poses().filter(|(_, quality)| quality.within_reach());
+        let is_usable =
+            |(x, _): &([f64; 6], _)| clearance.violation_at(&TaskState::at_rest(*x).motion().pose).is_none();
+        let usable: Vec<&PoseQuality> =
+            in_reach.clone().filter(is_usable).map(|(_, quality)| quality).collect();
         let ends = |value: fn(&PoseQuality) -> f64| {
-            let values = usable.clone().map(value);
+            let values = usable.iter().copied().map(value);
             values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(high, v)])
         };
         let [_, largest_margin_m] = ends(|quality| quality.stroke_margin);
         Self {
             plane: slice.plane.to_string(),
             poses: slice.qualities.len(),
-            in_reach: in_reach.clone().count(),
-            usable: usable.clone().count(),
+            in_reach: in_reach.count(),
+            usable: usable.len(),
             largest_margin_m,
             condition: ends(|quality| quality.condition),
             worst_force_n: ends(|quality| quality.worst_force),
@@ -208,9 +214,12 @@ impl fmt::Display for WorkspaceReport {
         write!(f, "{}", text_table(2, &columns, self.slices.iter().map(SliceReport::cells)))?;
         writeln!(
             f,
-            "\nin reach: within the stroke, on home's side of singular poses; usable: and the condition is up to {}\n\
-             ({CONDITION_MEANING}). Numbers are of usable poses; the actuators' limit is {} N.\n",
+            "\nin reach: within the stroke, on home's side of singular poses; usable: the reference goes there, the condition\n\
+             is up to {} ({CONDITION_MEANING}), no leg is near the first axis of its\n\
+             universal joint, and holding takes at most {:.0} % of the force. Numbers are of usable poses; the actuators'\n\
+             limit is {} N.\n",
             significant(self.condition_limit),
+            100.0 * MAX_HOLDING_SHARE,
             significant(self.max_force_n)
         )?;
         if let Some(hint) = &self.hint {

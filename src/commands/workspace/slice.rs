@@ -109,6 +109,12 @@ impl Slice {
         x
     }
 
+    /// X and quality of every pose.
+    pub fn poses(&self) -> impl Iterator<Item = ([f64; 6], &PoseQuality)> + Clone {
+        let x = |k| self.x([k % self.count, k / self.count]);
+        self.qualities.iter().enumerate().map(move |(k, quality)| (x(k), quality))
+    }
+
     /// Quality of a pose by its indices along both axes; `None` outside the slice.
     pub fn at(&self, [right, up]: [usize; 2]) -> Option<&PoseQuality> {
         if right < self.count { self.qualities.get(up * self.count + right) } else { None }
@@ -181,11 +187,11 @@ impl Slice {
                 .map(String::from),
         );
         let mut writer = CsvWriter::new(&columns);
-        for (k, quality) in self.qualities.iter().enumerate() {
+        for (x, quality) in self.poses() {
             let PoseQuality { stroke_margin, determinant, condition, worst_force, payload } = *quality;
             let in_reach = f64::from(u8::from(quality.within_reach()));
             let values = [in_reach, stroke_margin, determinant, condition, worst_force, payload];
-            writer.row(self.x([k % self.count, k / self.count]).into_iter().chain(values));
+            writer.row(x.into_iter().chain(values));
         }
         writer.save(path)
     }

@@ -3,6 +3,7 @@
 use super::Examiner;
 use super::machine::examine_holding;
 use crate::analysis::clearance::{Clearance, WorkspaceLimit};
+use crate::analysis::drive_capability::DriveCapability;
 use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::analysis::region_proof::{RegionProof, poses, prove};
 use crate::config::machine::rounded;
@@ -11,16 +12,25 @@ use crate::model::LEGS;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::Machine;
+use crate::model::task::TaskState;
 use crate::output::numbers::{AXES, axis_unit, significant};
 
 pub(super) fn examine(examiner: &mut Examiner) {
     let config = examiner.config;
     let Some(bounds) = &config.deployment.envelope else { return };
     let limits = &config.deployment.limits;
-    let reachable = within_margin(&config.machine, limits.stroke_margin_m);
+    let reachable = config.machine.within_margin(limits.stroke_margin_m);
     match prove(&reachable, &Clearance::new(&reachable, limits.condition), bounds) {
         RegionProof::Clear => examine_forces(examiner, bounds),
+        RegionProof::Violated(offsets, WorkspaceLimit::HoldingForce(_)) => {
+            let x: [f64; 6] =
+                (nalgebra::Vector6::from(config.machine.home) + nalgebra::Vector6::from(offsets)).into();
+            let pose = TaskState::at_rest(x).motion().pose;
+            let drives = DriveCapability::new(&config.machine, &pose);
+            let Some((leg, force)) = drives.map(|drives| drives.hardest_held()) else { return };
+            let place = format!("within [envelope] {}", offset_text(&offsets));
+            examine_holding(examiner, leg, force, &place);
+        }
         RegionProof::Violated(offsets, limit) => {
             examiner.error("envelope", offset_text(&offsets), limit_text(limit, limits.condition));
         }
@@ -30,14 +40,6 @@ pub(super) fn examine(examiner: &mut Examiner) {
             examine_forces(examiner, bounds);
         }
     }
-}
-
-/// The machine with the stroke that the reference uses.
-fn within_margin(machine: &Machine, margin_m: f64) -> Machine {
-    let mut reachable = machine.clone();
-    reachable.actuator.min_length += margin_m;
-    reachable.actuator.max_length -= margin_m;
-    reachable
 }
 
 /// Compares the drives with the forces at rest at corners and spread poses, and with those and the leg rates of the corners in
@@ -116,6 +118,12 @@ fn limit_text(limit: WorkspaceLimit, condition: f64) -> String {
             )
         }
         WorkspaceLimit::Singular => "it is across a singular pose; shrink the ranges".into(),
+        WorkspaceLimit::UniversalJoint => {
+            "a leg comes too near to the first axis of its universal joint there; shrink the ranges".into()
+        }
+        WorkspaceLimit::HoldingForce(leg) => {
+            format!("leg {} needs too much force there to hold the platform; shrink the ranges", leg + 1)
+        }
         WorkspaceLimit::Condition => {
             format!(
                 "the condition there is beyond limits.condition = {}; shrink the ranges",

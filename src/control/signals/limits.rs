@@ -2,7 +2,7 @@
 //!
 //! | bit | limit | bound | at the bound |
 //! | --- | --- | --- | --- |
-//! | 0 | force | `actuator.max_force_n` | the gravity part stays; one factor reduces the rest of all forces |
+//! | 0 | force | `actuator.max_force_n` | the reference gets slower, and stops before it; forces beyond it: the gravity part stays, one factor reduces the rest |
 //! | 1 | force rate | `limits.force_rate_n_s` | one factor reduces the changes of all forces |
 //! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | the reference stops before it |
 //! | 3 | leg rate | `actuator.max_rate_m_s` | kept by the reference |
@@ -14,7 +14,7 @@
 //! | 9 | condition | `limits.condition` | the reference stops before it; platform beyond it: stop, fault |
 //!
 //! The reference keeps its limits for every setpoint. Under `on_violation = "stop"` a setpoint beyond a limit
-//! is rejected, unless the limit is jerk or condition. A setpoint that the reference falls behind by more
+//! is rejected, unless the limit is jerk, condition or force. A setpoint that the reference falls behind by more
 //! than the engage tolerance is rejected, too. A rejected setpoint counts as not received: the reference
 //! continues over one wrong message among valid ones, and a stream of wrong messages ends in a stop. Under
 //! "limit" the reference follows as near as the limits allow.

@@ -8,7 +8,6 @@ use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::control::reference::proof::regularity::Reach;
 use crate::control::reference::stop::vector_stop::{Stop, StopState};
 use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::control::signals::pair::Pair;
@@ -101,7 +100,7 @@ impl PoseStop {
     /// Bounds on the distance that the stop covers within half of `dt` before or after a state: around a
     /// knot, with knots `dt` apart.
     #[inline(always)]
-    pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Reach {
+    pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Pair<f64> {
         let half = 0.5 * dt;
         let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
             half * stop.peak_velocity.min(state.velocity.norm() + 0.5 * half * limits.acceleration)

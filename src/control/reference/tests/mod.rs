@@ -9,6 +9,7 @@ use crate::control::tests::*;
 mod approach;
 mod between_knots;
 mod cubic_departure;
+mod drive_forces;
 mod generator;
 mod generator_bounds;
 mod knots;
