@@ -31,3 +31,4 @@ mod stamps;
 mod targets;
 mod tracking;
 mod trust;
+mod weak_poses;

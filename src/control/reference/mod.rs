@@ -17,6 +17,9 @@
 //!
 //! **If the stop is proved**, the reference takes the proposed motion and holds the stop ready (`stop`).
 //!
+//! **The drives must be able to make it.** Near a weak pose, or with weak drives, they cannot give the
+//! accelerations of `[limits]`. Proposal and stop then use a share of them, the strength.
+//!
 //! **On refusal** the proposal is dropped. The refusal names the limit that would be exceeded, or the effort
 //! if it was spent before the proof was complete. The reference follows the held stop for one step. This
 //! needs no check, because an earlier step verified this stop. The next step proposes again. Without a target
