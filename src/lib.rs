@@ -101,6 +101,7 @@
 //! | shortfall | set-up step that the kernel refused, with reason and remedy |
 //! | singular pose, singularity | pose at which the legs cannot hold the platform; det N = 0 |
 //! | stamp | CLOCK_MONOTONIC time in a message \[ns\] |
+//! | strength | share of the acceleration limits with which the reference moves and stops, where the drives cannot give all |
 //! | stroke | range of a leg's length |
 //! | target | goal of the reference: the setpoint, or a pose to hold |
 //! | timeline | hold, approach, settle, motion, settle |

@@ -30,6 +30,17 @@
 //! times, whatever setpoints are sent or lost, and whatever the state of the controller. Assumptions and
 //! proof: `docs/architecture.md`, section "Proof of the verified stop".
 //!
+//! What fails without a piece (2026-11-26, `tests/mutants`, 61 to 70):
+//!
+//! | piece | test |
+//! | --- | --- |
+//! | a stop may be as far beyond a bound as its start | `generator_bounds::a_reference_beyond_a_bound_by_rounding_only_returns` |
+//! | relaxed bounds follow the reference back | `generator_bounds::bounds_that_were_relaxed_at_the_start_hold_after_the_return` |
+//! | room beyond the pose of the start | `generator_bounds::a_start_beside_an_end_stop_never_leads_into_it` |
+//! | free space is proved with one pose | `the_approach_keeps_the_limits` |
+//! | looser bounds between knots, history | golden hashes only |
+//! | forces of stops, force at rest | `tests/reference/weak_poses.rs`, `tests/closed_loop/weak_poses.rs` |
+//!
 //! | folder | content |
 //! | --- | --- |
 //! | `proposal` | acceleration towards a moving target, and away from bounds |

@@ -102,7 +102,6 @@ impl<'a> StopExamination<'a> {
         x: Option<&[f64; 6]>,
         step: &Step<'a>,
         forces: ForceProof,
-        effort: u32,
     ) -> Result<Self, Refusal> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
@@ -153,7 +152,7 @@ impl<'a> StopExamination<'a> {
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             relaxed: None,
-            effort: effort.saturating_sub(knots.intervals),
+            effort: MAX_STEP_EFFORT.saturating_sub(step.effort).saturating_sub(knots.intervals),
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,

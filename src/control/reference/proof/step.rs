@@ -12,7 +12,7 @@ pub(in crate::control::reference) struct Step<'a> {
     pub duration: f64,
     /// Norms of the change of acceleration over the step \[rad/s^2\], \[m/s^2\].
     pub acceleration_change: Pair<f64>,
-    /// Effort that the proposal took, in knots of an examination.
+    /// Effort that is spent already, in knots of an examination.
     pub effort: u32,
     /// Share of the accelerations with which the stop is planned.
     pub strength: f64,

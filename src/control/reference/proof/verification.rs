@@ -68,12 +68,13 @@ impl Verifier {
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
+        let step = Step { effort: MAX_STEP_EFFORT.saturating_sub(effort), ..*step };
         let limits = limits.containing(acceleration);
         brake_at_once.plan(constants.machine().level, StopKind::BrakeAtOnce, motion, &limits);
         let PoseStop { orientation, position } = &*brake_at_once;
         let speeds = Pair { angular: orientation.peak_velocity, linear: position.peak_velocity };
         let forces = forces(StopKind::BrakeAtOnce, speeds, &limits);
-        StopExamination::new(constants, bounds, brake_at_once, motion, x.as_ref(), step, forces, effort)?
+        StopExamination::new(constants, bounds, brake_at_once, motion, x.as_ref(), &step, forces)?
             .check_knots(&mut self.balls, motion)?;
         Ok(StopKind::BrakeAtOnce)
     }
