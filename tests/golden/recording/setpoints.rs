@@ -21,6 +21,7 @@ pub const SCRIPTS: &[Script] = &[
     ("poses_at_60_hz", "telescope", LIMIT, poses),
     ("targets", "tabletop", LIMIT_500, targets),
     ("near_singular_poses", "motion_base", NEAR_SINGULAR, near_singular),
+    ("weak_poses", "motion_base", LIMIT, weak_poses),
 ];
 
 /// Drives that the limits of the reference demand too much of.
@@ -205,6 +206,22 @@ payload_change_kg = inf
 [setpoint]
 on_violation = \"limit\"
 ";
+
+fn weak_poses(recorder: &mut Recorder) {
+    recorder.run(20);
+    // It is carried down to where the drives cannot hold it, and back.
+    let (machine, mut task) = (recorder.config.machine.clone(), TaskState::at_rest(recorder.x().into()));
+    recorder.run_with(500, |m| {
+        task.x[5] += if m.cycle < 250 { -0.0045 } else { 0.0045 };
+        m.measured().length = leg_lengths(&machine, &task.motion().pose);
+        m.measured().rate = None;
+    });
+    recorder.run(20);
+    recorder.engage();
+    recorder.go([0.0, 0.0, 0.0, 0.0, 0.0, -1.2], 0.8);
+    recorder.run(500);
+    recorder.go([0.1, 0.0, 0.0, 0.2, 0.0, -0.4], 0.5);
+}
 
 fn near_singular(recorder: &mut Recorder) {
     recorder.run(20);

@@ -214,7 +214,8 @@ fn peaks<S: Simd>(simd: S, loads: &DriveLoads, accelerations: &Pair<Acceleration
     let holding = load(&loads.holding);
     let (mut lowest, mut highest) = (holding, holding);
     for (columns, ranges) in [([ax, ay, az], &accelerations.angular), ([lx, ly, lz], &accelerations.linear)] {
-        let [x, y, z] = columns.map(load);
+        let [x, y, z] = columns;
+        let (x, y, z) = (load(x), load(y), load(z));
         for AccelerationRange { direction, lowest: low, highest: high } in &ranges.ranges {
             let force = x * splat(direction.x) + y * splat(direction.y) + z * splat(direction.z);
             let (low, high) = (force * splat(*low), force * splat(*high));

@@ -381,7 +381,7 @@ impl RegularBalls {
         forces.forget();
         // Another ball of the group may cover the poses as well. A new ball that is too small for the reach
         // may still prove a knot: it stays until the next new ball.
-        let group = *group;
+        let Some(group) = self.groups.get(index) else { return Err(Refusal::Effort) };
         dispatch!(constants.machine().level, simd => {
             let distances = group.center_distances(simd, pose);
             let coverage = group.coverage(simd, constants, &distances, *reach, required);
