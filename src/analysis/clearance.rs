@@ -40,6 +40,7 @@ use crate::control::constants::{MAX_HOLDING_SHARE, least_universal_sine};
 use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::conditioning::Conditioning;
+use crate::model::drive_loads::DriveLoads;
 use crate::model::force_changes::{ForceChangeBounds, LargestMotion};
 use crate::model::inverse_geometry::{leg_lengths, universal_sine};
 use crate::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
@@ -188,8 +189,8 @@ impl<'a> Clearance<'a> {
     /// Whether a proof exists that in a cell no leg is near the first axis of its universal joint, and that the drives can hold
     /// the platform. `turned_leg`, `change` and `left` are the largest q and D, and `1 - f`.
     fn is_held(&self, pose: &Pose, turn: f64, turned_leg: f64, change: f64, left: f64) -> bool {
-        let middle = Conditioning::new(&self.dynamics, pose);
-        let Some(loads) = middle.loads else { return false };
+        let middle = Conditioning::new(self.machine, pose);
+        let Some(loads) = DriveLoads::new(&self.dynamics, pose) else { return false };
         let forces = loads.holding(self.machine);
         let largest = forces.into_iter().map(f64::abs).fold(0.0, f64::max);
         let norm = forces.into_iter().map(|force| force * force).sum::<f64>().sqrt();

@@ -3,11 +3,10 @@
 
 use fearless_simd::dispatch;
 
-use super::active_forces::InverseDynamics;
-use super::drive_loads::DriveLoads;
 use super::factorization::Factorization;
 use super::inverse_geometry::LegGeometry;
 use super::lanes::least_of_legs;
+use super::machine::Machine;
 use super::rigid::Pose;
 use super::sensitivity::Sensitivity;
 
@@ -18,8 +17,6 @@ pub(crate) struct Conditioning {
     pub sensitivity: Sensitivity,
     /// Largest norm of a row of `N^-1`, as in the sensitivity.
     pub largest_row: f64,
-    /// Forces of the drives; `None` where the pose is singular.
-    pub loads: Option<DriveLoads>,
     /// Length of the shortest leg \[m\].
     pub shortest: f64,
     /// See [`super::inverse_geometry::universal_sine`].
@@ -31,16 +28,15 @@ pub(crate) struct Conditioning {
 
 impl Conditioning {
     /// Evaluates the conditioning of a machine at a pose.
-    pub fn new(dynamics: &InverseDynamics, pose: &Pose) -> Self {
-        let joints = dynamics.joints();
-        dispatch!(dynamics.machine().level, simd => {
+    pub fn new(machine: &Machine, pose: &Pose) -> Self {
+        let joints = &machine.joints;
+        dispatch!(machine.level, simd => {
             let legs = LegGeometry::around_center(simd, joints, pose);
             let factorization = Factorization::new(simd, joints, &legs);
             let (sensitivity, largest_row) =
                 Sensitivity::with_largest_row(simd, joints, &legs, &factorization);
             Self {
                 largest_row,
-                loads: DriveLoads::of_legs(simd, dynamics, &legs, &factorization, pose),
                 sensitivity,
                 shortest: least_of_legs(legs.length),
                 universal_sine: legs.universal_sine(simd, joints),

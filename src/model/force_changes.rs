@@ -46,6 +46,8 @@ pub(crate) struct LargestMotion {
 /// Factors of the bounds on changes of the forces, constant for a machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForceChangeBounds {
+    /// Wrench at any pose: of the weight, per acceleration of C, per angular acceleration.
+    whole: [f64; 3],
     /// Change of the wrench per t: of the weight, per acceleration of C, per angular acceleration.
     by_turn: [f64; 3],
     /// Change of the wrench per q: of the weight, per acceleration of a joint.
@@ -85,6 +87,11 @@ impl ForceChangeBounds {
         let axial_mass = actuator.reflected_mass + machine.rod.mass;
         let length = actuator.min_length;
         Self {
+            whole: [
+                (mass * com_wrench + wrench_sum * legs.weight) * g,
+                mass * com_wrench + wrench_sum * legs.inertia,
+                mass * com * com_wrench + inertia / r + wrench_sum * legs.inertia * arm,
+            ],
             by_turn: [
                 (mass * com_arm + arm_sum * legs.weight) * g,
                 mass * com_arm + arm_sum * legs.inertia,
@@ -143,6 +150,19 @@ impl ForceChangeBounds {
                 + axial * turning
                 + joint_axial * joint
                 + self.viscous_friction * joint_speed.min(self.max_rate),
+        }
+    }
+
+    /// Forces at any pose.
+    pub fn whole(&self, motion: &LargestMotion) -> ForceBound {
+        let ([weight, by_linear, by_angular], of_velocity) = (self.whole, self.moving(motion, 0.0, 0.0));
+        let joint_acceleration = motion.linear + self.arm * motion.angular;
+        ForceBound {
+            wrench: weight + by_linear * motion.linear + by_angular * motion.angular + of_velocity.wrench,
+            axial: self.axial_mass * joint_acceleration
+                + self.axial_weight
+                + self.coulomb_friction
+                + of_velocity.axial,
         }
     }
 

@@ -69,13 +69,13 @@ pub struct Bounds {
 /// The limits of the deployment, which the reference keeps exactly; the platform is driven by forces that are held for a
 /// period. At the speed of the scene brakes need 50 ms, a stop 100 ms; before it, up to 50 ms pass until a peer counts as
 /// lost.
-pub const GENTLE: Bounds = Bounds { acceleration: 1.015, jerk: 1.04, rest_s: 0.2 };
+pub const GENTLE: Bounds = Bounds { acceleration: 1.015, jerk: 1.04, rest_s: 0.21 };
 /// For those that begin a motion which ends later.
 pub const LONG: Bounds = Bounds { rest_s: 1.6, ..GENTLE };
 /// For a motion that ends in a stop most of a second later.
 pub const LATE: Bounds = Bounds { rest_s: 0.8, ..GENTLE };
 /// A tenth of a second of acceleration, the timeout, and the stop.
-pub const ACCELERATED: Bounds = Bounds { rest_s: 0.3, ..GENTLE };
+pub const ACCELERATED: Bounds = Bounds { rest_s: 0.4, ..GENTLE };
 /// Brakes decelerate the platform until the first force arrives.
 pub const OUT_OF_THE_BRAKES: Bounds = Bounds { acceleration: 1.06, jerk: 2.6, ..LONG };
 pub const PARKED_OUT_OF_THE_BRAKES: Bounds = Bounds { jerk: 1.08, ..LONG };

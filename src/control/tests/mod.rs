@@ -24,6 +24,7 @@ pub(in crate::control) use crate::model::rigid::{Pose, exp};
 
 mod assessment;
 mod feedback;
+mod force_limits;
 mod free_motion;
 mod measurements;
 pub(in crate::control) mod random_vectors;

@@ -209,10 +209,15 @@ on_violation = \"limit\"
 
 fn weak_poses(recorder: &mut Recorder) {
     recorder.run(20);
-    // It is carried down to where the drives cannot hold it, and back.
+    // It is carried down to where the drives cannot hold it, stands, and is carried back.
     let (machine, mut task) = (recorder.config.machine.clone(), TaskState::at_rest(recorder.x().into()));
-    recorder.run_with(500, |m| {
-        task.x[5] += if m.cycle < 250 { -0.0045 } else { 0.0045 };
+    recorder.run_with(700, |m| {
+        task.x[5] += match m.cycle {
+            0..250 => -0.0045,
+            250..450 => 0.0,
+            _ => 0.0045,
+        };
+        *m.task() = task;
         m.measured().length = leg_lengths(&machine, &task.motion().pose);
         m.measured().rate = None;
     });

@@ -26,10 +26,13 @@ use crate::control::signals::pair::Pair;
 use crate::model::drive_loads::DriveLoads;
 use crate::model::force_changes::{ForceBound, ForceChangeBounds, LargestMotion};
 use crate::model::machine::Machine;
+use crate::model::rigid::Pose;
 use crate::model::triples::LegLanes;
 
 /// Largest force of a stop, as a share of `actuator.max_force_n`. The rest is for feedback.
 const MAX_MOVING_SHARE: f64 = 0.95;
+/// Most loads that are computed in a proof: it bounds the longest cycle.
+const MAX_EVALUATIONS: u32 = 4;
 
 /// Bounds of the forces \[N\].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,24 +101,43 @@ pub(in crate::control::reference) struct CenterDistance {
     pub change: f64,
 }
 
-/// Loads of the drives at the centre of a ball.
+/// Loads of the drives at the centre of a ball. They are computed when they are first needed: strong drives need
+/// only the bound for any pose.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct BallLoads {
+    center: Option<Pose>,
+    /// B and rho.
+    inverse_norm: f64,
+    largest_row: f64,
+    is_known: bool,
     loads: DriveLoads,
     /// Largest force at rest, and norm of these forces \[N\].
     holding: f64,
     holding_norm: f64,
-    /// B and rho.
-    inverse_norm: f64,
-    largest_row: f64,
 }
 
 impl BallLoads {
-    pub fn new(loads: &DriveLoads, inverse_norm: f64, largest_row: f64) -> Self {
+    pub fn new(center: &Pose, inverse_norm: f64, largest_row: f64) -> Self {
+        Self { center: Some(*center), inverse_norm, largest_row, ..Self::default() }
+    }
+
+    /// Computes the loads. Returns whether the centre is regular.
+    // Out of line because it is rare: the code of the cycle stays short.
+    #[inline(never)]
+    fn evaluate(&mut self, constants: &Constants) -> bool {
+        let loads = self.center.and_then(|center| DriveLoads::new(&constants.dynamics, &center));
+        let Some(loads) = loads else { return false };
         let LegLanes(forces) = loads.holding;
-        let holding = largest(forces);
-        let holding_norm = forces.iter().map(|force| force * force).sum::<f64>().sqrt();
-        Self { loads: *loads, holding, holding_norm, inverse_norm, largest_row }
+        self.holding = largest(forces);
+        self.holding_norm = forces.iter().map(|force| force * force).sum::<f64>().sqrt();
+        (self.loads, self.is_known) = (loads, true);
+        true
+    }
+
+    /// Factor of a wrench at a distance from the centre.
+    #[inline(always)]
+    fn factor(&self, distance: &CenterDistance) -> f64 {
+        self.largest_row / (1.0 - self.inverse_norm * distance.change)
     }
 
     /// Bound on a force at a distance from the centre, from the largest force and the norm there.
@@ -127,8 +149,9 @@ impl BallLoads {
         change: &ForceBound,
         distance: &CenterDistance,
     ) -> f64 {
-        let factor = self.largest_row / (1.0 - self.inverse_norm * distance.change);
-        largest + factor * (change.wrench + distance.change * (norm + axial_norm)) + change.axial
+        largest
+            + self.factor(distance) * (change.wrench + distance.change * (norm + axial_norm))
+            + change.axial
     }
 
     /// Bound on a force at rest at a distance from the centre.
@@ -151,23 +174,46 @@ pub(in crate::control::reference) struct ForceProof {
     bounds: ForceBounds,
     /// Force at rest by which the bound may be exceeded between knots \[N\].
     held_between_knots: f64,
+    /// Bound on the forces at any pose.
+    at_any_pose: ForceBound,
+    evaluations_left: u32,
     /// Ball that was used last, and the largest force of the stop at its centre and the norm there.
     at_center: Option<(usize, [f64; 2])>,
 }
 
 impl ForceProof {
     /// Proof for a stop in free space, or knot by knot.
-    pub fn new(demand: StopDemand, bounds: ForceBounds, kind: StopKind) -> Self {
+    pub fn new(constants: &Constants, demand: StopDemand, bounds: ForceBounds, kind: StopKind) -> Self {
         let held_between_knots = match kind {
             StopKind::ReleaseFirst => 0.0,
             StopKind::BrakeAtOnce => FORCE_BETWEEN_KNOTS_RATIO * bounds.moving,
         };
-        Self { demand, bounds, held_between_knots, at_center: None }
+        let at_any_pose = constants.force_changes.whole(&demand.largest());
+        let evaluations_left = MAX_EVALUATIONS;
+        Self { demand, bounds, held_between_knots, at_any_pose, evaluations_left, at_center: None }
     }
 
     /// Forgets the forces at the centre of a ball, because another ball replaces it.
     pub fn forget(&mut self) {
         self.at_center = None;
+    }
+
+    /// Whether the drives are strong enough whatever the pose, with the factor of a ball.
+    #[inline(always)]
+    fn is_generous(&self, ball: &BallLoads, distance: &CenterDistance) -> bool {
+        let ForceBound { wrench, axial } = self.at_any_pose;
+        ball.factor(distance) * wrench + axial <= self.bounds.holding
+    }
+
+    /// Whether the loads of a ball are known; computes them if the effort suffices.
+    #[inline(always)]
+    fn knows(&mut self, constants: &Constants, ball: &mut BallLoads) -> bool {
+        if ball.is_known {
+            return true;
+        }
+        let is_allowed = self.evaluations_left > 0;
+        self.evaluations_left = self.evaluations_left.saturating_sub(1);
+        is_allowed && ball.evaluate(constants)
     }
 
     /// Whether the drives can give what the stop takes, at every pose within a distance from the centre of a
@@ -176,10 +222,16 @@ impl ForceProof {
     pub fn holds<S: Simd>(
         &mut self,
         simd: S,
-        changes: &ForceChangeBounds,
-        (index, ball): (usize, &BallLoads),
+        constants: &Constants,
+        (index, ball): (usize, &mut BallLoads),
         distance: &CenterDistance,
     ) -> bool {
+        if self.is_generous(ball, distance) {
+            return true;
+        }
+        if !self.knows(constants, ball) {
+            return false;
+        }
         let peaks = match self.at_center {
             Some((known, peaks)) if known == index => peaks,
             _ => {
@@ -187,6 +239,7 @@ impl ForceProof {
                 self.at_center.insert((index, peaks)).1
             }
         };
+        let changes = &constants.force_changes;
         let CenterDistance { turn, turned_leg, .. } = *distance;
         let motion = self.demand.largest();
         let (at_rest, moving) =
@@ -200,8 +253,15 @@ impl ForceProof {
 
     /// Whether the drives can hold the platform at a distance from the centre of a ball.
     #[inline(always)]
-    pub fn is_held(&self, changes: &ForceChangeBounds, ball: &BallLoads, distance: &CenterDistance) -> bool {
-        ball.largest_held(changes, distance) <= self.bounds.holding
+    pub fn is_held(
+        &mut self,
+        constants: &Constants,
+        ball: &mut BallLoads,
+        distance: &CenterDistance,
+    ) -> bool {
+        self.is_generous(ball, distance)
+            || self.knows(constants, ball)
+                && ball.largest_held(&constants.force_changes, distance) <= self.bounds.holding
     }
 }
 

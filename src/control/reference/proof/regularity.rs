@@ -218,15 +218,15 @@ impl Ball {
     /// pivots are needed: their effort is subtracted afterwards.
     fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
-        let Conditioning { sensitivity, largest_row, loads, shortest, universal_sine, is_pivoted } =
-            Conditioning::new(&constants.dynamics, center);
+        let Conditioning { sensitivity, largest_row, shortest, universal_sine, is_pivoted } =
+            Conditioning::new(constants.machine(), center);
         if is_pivoted {
             *effort = effort.saturating_sub(PIVOTING_EFFORT);
         }
         let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };
         let inverse_norm = condition / norm;
-        let loads = BallLoads::new(&loads.ok_or(Limit::Condition)?, inverse_norm, largest_row);
+        let loads = BallLoads::new(center, inverse_norm, largest_row);
         Ok(Self { norm, inverse_norm, shortest, regularity, loads })
     }
 }
@@ -281,7 +281,7 @@ impl RegularBalls {
                 if let Some(group) = self.groups.get(index) {
                     let distances = group.center_distances(simd, pose);
                     let coverage = group.coverage(simd, constants, &distances, *reach, required);
-                    if self.are_strong(simd, constants, index, &coverage, forces) {
+                    if are_strong(simd, constants, &mut self.loads, index, &coverage, forces) {
                         self.recent = index;
                         return true;
                     }
@@ -289,33 +289,6 @@ impl RegularBalls {
             }
             false
         })
-    }
-
-    /// Whether a ball of a group proves that the drives are strong enough for a stop among covered poses.
-    #[inline(always)]
-    fn are_strong<S: Simd>(
-        &self,
-        simd: S,
-        constants: &Constants,
-        group: usize,
-        coverage: &Coverage<S>,
-        forces: &mut ForceProof,
-    ) -> bool {
-        let Some((ball, distance)) = self.nearest(simd, group, coverage) else { return false };
-        forces.holds(simd, &constants.force_changes, ball, &distance)
-    }
-
-    /// The nearest ball of a group that covers poses, by index, and the distance of the poses from its centre.
-    #[inline(always)]
-    fn nearest<S: Simd>(
-        &self,
-        simd: S,
-        group: usize,
-        coverage: &Coverage<S>,
-    ) -> Option<((usize, &BallLoads), CenterDistance)> {
-        let (lane, distance) = coverage.nearest(simd)?;
-        let index = group * LANES + lane;
-        Some(((index, self.loads.get(index)?), distance))
     }
 
     /// Indices of the groups. The group that covered the last pose comes first, because the next pose is
@@ -346,15 +319,18 @@ impl RegularBalls {
             let distances = group.center_distances(simd, pose);
             if !are_surroundings_covered {
                 let coverage = group.coverage(simd, constants, &distances, reach, &around);
-                are_surroundings_covered = self.are_strong(simd, constants, index, &coverage, forces);
+                are_surroundings_covered =
+                    are_strong(simd, constants, &mut self.loads, index, &coverage, forces);
             }
             // Without covered surroundings the knot becomes the centre of a new ball.
             if !are_surroundings_covered {
                 continue;
             }
             let coverage = group.coverage(simd, constants, &distances, Reach::default(), &at_knot);
-            let Some((ball, distance)) = self.nearest(simd, index, &coverage) else { continue };
-            if forces.is_held(&constants.force_changes, ball.1, &distance) {
+            let Some((_, ball, distance)) = nearest(simd, &mut self.loads, index, &coverage) else {
+                continue;
+            };
+            if forces.is_held(constants, ball, &distance) {
                 self.recent = index;
                 return true;
             }
@@ -374,10 +350,10 @@ impl RegularBalls {
     ) -> Result<Regularity, Refusal> {
         let RegularityQuery { pose, reach, required } = around;
         let ball = Ball::new(constants, pose, effort)?;
-        let index = self.next_slot / LANES;
+        let (slot, index) = (self.next_slot, self.next_slot / LANES);
         let group = self.groups.get_mut(index).ok_or(Refusal::Effort)?;
-        group.set(self.next_slot % LANES, pose, &ball);
-        *self.loads.get_mut(self.next_slot).ok_or(Refusal::Effort)? = ball.loads;
+        group.set(slot % LANES, pose, &ball);
+        *self.loads.get_mut(slot).ok_or(Refusal::Effort)? = ball.loads;
         forces.forget();
         // Another ball of the group may cover the poses as well. A new ball that is too small for the reach
         // may still prove a knot: it stays until the next new ball.
@@ -387,8 +363,10 @@ impl RegularBalls {
             let coverage = group.coverage(simd, constants, &distances, *reach, required);
             if !coverage.is_covered.any_true() {
                 Err(Limit::Condition)
-            } else if !self.are_strong(simd, constants, index, &coverage, forces)
-                || !forces.is_held(&constants.force_changes, &ball.loads, &CenterDistance::default())
+            } else if !are_strong(simd, constants, &mut self.loads, index, &coverage, forces)
+                || !self.loads.get_mut(slot).is_some_and(|ball| {
+                    forces.is_held(constants, ball, &CenterDistance::default())
+                })
             {
                 Err(Limit::Force)
             } else {
@@ -399,4 +377,31 @@ impl RegularBalls {
         self.next_slot = (self.next_slot + 1) % (GROUPS * LANES);
         Ok(ball.regularity)
     }
+}
+
+/// Whether a ball of a group proves that the drives are strong enough for a stop among covered poses.
+#[inline(always)]
+fn are_strong<S: Simd>(
+    simd: S,
+    constants: &Constants,
+    loads: &mut [BallLoads],
+    group: usize,
+    coverage: &Coverage<S>,
+    forces: &mut ForceProof,
+) -> bool {
+    let Some((index, ball, distance)) = nearest(simd, loads, group, coverage) else { return false };
+    forces.holds(simd, constants, (index, ball), &distance)
+}
+
+/// The nearest ball of a group that covers poses, its index, and the distance of the poses from its centre.
+#[inline(always)]
+fn nearest<'a, S: Simd>(
+    simd: S,
+    loads: &'a mut [BallLoads],
+    group: usize,
+    coverage: &Coverage<S>,
+) -> Option<(usize, &'a mut BallLoads, CenterDistance)> {
+    let (lane, distance) = coverage.nearest(simd)?;
+    let index = group * LANES + lane;
+    Some((index, loads.get_mut(index)?, distance))
 }

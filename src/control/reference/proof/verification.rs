@@ -54,7 +54,7 @@ impl Verifier {
         };
         let forces = |kind, speeds, limits: &Limits| {
             let accelerations = AccelerationRanges::of_stop(kind, motion, limits);
-            ForceProof::new(StopDemand { accelerations, speeds }, bounds.forces, kind)
+            ForceProof::new(constants, StopDemand { accelerations, speeds }, bounds.forces, kind)
         };
         let speeds = Pair { angular: turn.peak_velocity, linear: shift.peak_velocity };
         let mut free = forces(StopKind::ReleaseFirst, speeds, &limits);

@@ -25,7 +25,7 @@ fn no_force_changes_by_more_than_its_bound() {
             let step = Twist { angular: samples.vector(0.1), linear: samples.vector(0.1 * stroke) };
             let (turn, shift) = (step.angular.norm(), step.linear.norm());
             let Conditioning { sensitivity, largest_row, shortest, universal_sine, .. } =
-                Conditioning::new(&dynamics, &center);
+                Conditioning::new(&machine, &center);
             let moved = shift + changes.arm * turn;
             let turned_leg = moved / (shortest * (shortest - moved)).sqrt();
             let change = (6.0 * (turned_leg.powi(2) + (turn + turned_leg).powi(2))).sqrt();

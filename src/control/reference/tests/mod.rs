@@ -22,11 +22,11 @@ mod verification;
 /// as needed.
 fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: Pair<f64>) -> bool {
     let around = RegularityQuery { pose, reach, required: Regularity::reference_bounds(constants) };
-    balls.prove(constants, &around, &mut unlimited_forces(), &mut u32::MAX.clone())
+    balls.prove(constants, &around, &mut unlimited_forces(constants), &mut u32::MAX.clone())
 }
 
 /// Proof of forces that no stop exceeds.
-fn unlimited_forces() -> ForceProof {
+fn unlimited_forces(constants: &Constants) -> ForceProof {
     let bounds = ForceBounds { holding: f64::INFINITY, moving: f64::INFINITY };
-    ForceProof::new(StopDemand::default(), bounds, StopKind::ReleaseFirst)
+    ForceProof::new(constants, StopDemand::default(), bounds, StopKind::ReleaseFirst)
 }
