@@ -86,7 +86,7 @@ pub const ENDLESS: Bounds = Bounds { rest_s: f64::INFINITY, ..GENTLE };
 /// What hangs on the platform besides is pulled by feedback.
 pub const PULLED: Bounds = Bounds { acceleration: 1.05, ..LONG };
 /// After cycles that were missed the setpoint is followed in longer steps.
-pub const MISSED: Bounds = Bounds { jerk: 1.31, ..LONG };
+pub const MISSED: Bounds = Bounds { jerk: 1.4, ..LONG };
 /// Within what is believed to be noise of an encoder.
 pub const UNSEEN: Bounds = Bounds { acceleration: 1.03, jerk: 1.6, ..GENTLE };
 /// By 1 g beside what the reference does.
@@ -218,9 +218,8 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
         ("a leg without force", Engaging, false) => {
             Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FeedbackSaturated)])
         }
-        ("a leg without force", Stopping, false) | ("a drive reports half of its force", Stopping, false) => {
-            On
-        }
+        ("a leg without force", Stopping, false) => On,
+        ("a drive reports half of its force", Stopping, false) if !is_pd => On,
         ("the drives brake by themselves" | "the drives brake and setpoints end", Parking, true) => LASTING,
         ("the drives brake by themselves" | "the drives brake and setpoints end", Stopping, false) => {
             Brake(SensorFrozen)

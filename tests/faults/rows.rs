@@ -221,8 +221,8 @@ pub const ROWS: &[Row] = &[
     // Two at once.
     ("setpoints end, then measurements", together::setpoint_ends_then_measurement, GENTLE, [
         Idle(State::Off, MeasurementLost), End(SetpointEnded), End(SetpointEnded),
-        Path(&[(State::Stopping, SetpointLost), (State::Fault, MeasurementLost)]), On,
-        Brake(MeasurementLost), On,
+        Path(&[(State::Stopping, SetpointLost), (State::Fault, MeasurementLost)]),
+        Brake(MeasurementLost), Brake(MeasurementLost), On,
     ]),
     ("both end", together::both_end, GENTLE, unusable_measurement(MeasurementLost)),
     ("NaN in both", together::nan_in_both, GENTLE, unusable_measurement(MeasurementNotFinite)),
