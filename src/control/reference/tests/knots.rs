@@ -54,7 +54,7 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| {
             let reach = Pair { angular: 0.0, linear: reach };
             dispatch!(machine.level, simd => {
-                balls.prove_knot_from_kept(simd, constants, &pose, reach, &mut unlimited_forces(&constants))
+                balls.prove_knot_from_kept(simd, constants, &pose, reach, &mut unlimited_forces(constants))
             })
         };
         let mut balls = RegularBalls::default();
