@@ -25,7 +25,7 @@
 //! |n''| <= (a (t^2 + t'^2) + 3 s^2 / l) / l,  l = L0 - s       |m''| / r <= (a' / r) (t^2 + t'^2 + 2 t s / l + |n''|)
 //! ```
 //!
-//! Sine of the angle to the axis of a universal joint: at least that of the middle less q. Force that holds the platform: see
+//! Sine of the angle to the axis of a universal joint: at least that at the centre less q. Force that holds the platform: see
 //! [`crate::model::force_changes`].
 //!
 //! Cells that cover a region around home and all pass have the sign of home's determinant everywhere.

@@ -2,7 +2,7 @@
 //!
 //! | bit | limit | bound | at the bound |
 //! | --- | --- | --- | --- |
-//! | 0 | force | `actuator.max_force_n` | the reference gets slower, and stops before it; forces beyond it: the gravity part stays, one factor reduces the rest |
+//! | 0 | force | `actuator.max_force_n` | the reference is slower, and stops before it; beyond it the gravity part stays, one factor reduces the rest |
 //! | 1 | force rate | `limits.force_rate_n_s` | one factor reduces the changes of all forces |
 //! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | the reference stops before it |
 //! | 3 | leg rate | `actuator.max_rate_m_s` | kept by the reference |

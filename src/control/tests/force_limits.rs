@@ -42,8 +42,8 @@ fn beyond_a_limit_all_legs_lose_the_same_share_of_what_is_not_weight_or_of_the_c
         assert_eq!(is_cut, largest(&wanted) > limit, "{k}");
         if is_cut {
             cut += 1;
-            let (share, astray) = share(&limited.force, &wanted, &weight);
-            assert!((0.0..1.0).contains(&share) && astray < 1e-9, "{k}: {share} {astray}");
+            let (share, deviation) = share(&limited.force, &wanted, &weight);
+            assert!((0.0..1.0).contains(&share) && deviation < 1e-9, "{k}: {share} {deviation}");
             assert!(
                 (largest(&limited.force) - limit).abs() < 1e-9 * limit,
                 "{k}: no more is lost than must be"
@@ -61,8 +61,8 @@ fn beyond_a_limit_all_legs_lose_the_same_share_of_what_is_not_weight_or_of_the_c
         assert!(largest(&step) <= most * (1.0 + 1e-9), "{k}");
         if limited.active_limits.contains(Limit::ForceRate) {
             slowed += 1;
-            let (share, astray) = share(&limited.force, &next, &before);
-            assert!((0.0..1.0).contains(&share) && astray < 1e-9, "{k}: {share} {astray}");
+            let (share, deviation) = share(&limited.force, &next, &before);
+            assert!((0.0..1.0).contains(&share) && deviation < 1e-9, "{k}: {share} {deviation}");
             assert!(largest(&step) > most * (1.0 - 1e-9), "{k}: no slower than it must be");
         } else {
             assert_eq!(limited.force, next);
