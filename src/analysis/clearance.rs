@@ -26,7 +26,7 @@
 //! ```
 //!
 //! Sine of the angle to the axis of a universal joint: at least that at the centre less q. Force that holds the platform: see
-//! [`crate::model::force_changes`].
+//! `model::force_changes`.
 //!
 //! Cells that cover a region around home and all pass have the sign of home's determinant everywhere.
 //!

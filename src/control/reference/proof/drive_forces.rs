@@ -101,37 +101,39 @@ pub(in crate::control::reference) struct CenterDistance {
     pub change: f64,
 }
 
-/// Loads of the drives at the centre of a ball. They are computed when they are first needed: strong drives need
-/// only the bound for any pose.
+/// Loads of the drives at the centre of a ball.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct CenterLoads {
+    loads: DriveLoads,
+    /// Largest force at rest, and norm of these forces \[N\].
+    holding: [f64; 2],
+}
+
+/// Forces of the drives in a ball. The loads are computed when they are first needed: strong drives need only
+/// the bound for any pose.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct BallLoads {
-    center: Option<Pose>,
     /// B and rho.
     inverse_norm: f64,
     largest_row: f64,
-    is_known: bool,
-    loads: DriveLoads,
-    /// Largest force at rest, and norm of these forces \[N\].
-    holding: f64,
-    holding_norm: f64,
+    at_center: Option<CenterLoads>,
+    center: Option<Pose>,
 }
 
 impl BallLoads {
     pub fn new(center: &Pose, inverse_norm: f64, largest_row: f64) -> Self {
-        Self { center: Some(*center), inverse_norm, largest_row, ..Self::default() }
+        Self { inverse_norm, largest_row, at_center: None, center: Some(*center) }
     }
 
-    /// Computes the loads. Returns whether the centre is regular.
+    /// Computes the loads at the centre, if it is regular.
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
-    fn evaluate(&mut self, constants: &Constants) -> bool {
+    fn evaluate(&mut self, constants: &Constants) {
         let loads = self.center.and_then(|center| DriveLoads::new(&constants.dynamics, &center));
-        let Some(loads) = loads else { return false };
-        let LegLanes(forces) = loads.holding;
-        self.holding = largest(forces);
-        self.holding_norm = forces.iter().map(|force| force * force).sum::<f64>().sqrt();
-        (self.loads, self.is_known) = (loads, true);
-        true
+        self.at_center = loads.map(|loads| {
+            let LegLanes(forces) = loads.holding;
+            CenterLoads { loads, holding: [largest(forces), norm(forces)] }
+        });
     }
 
     /// Factor of a wrench at a distance from the centre.
@@ -156,15 +158,24 @@ impl BallLoads {
 
     /// Bound on a force at rest at a distance from the centre.
     #[inline(always)]
-    fn largest_held(&self, changes: &ForceChangeBounds, distance: &CenterDistance) -> f64 {
+    fn largest_held(
+        &self,
+        center: &CenterLoads,
+        changes: &ForceChangeBounds,
+        distance: &CenterDistance,
+    ) -> f64 {
         let change = changes.at_rest(distance.turn, distance.turned_leg);
         let axial_norm = changes.axial_norm(&LargestMotion::default());
-        self.largest_around([self.holding, self.holding_norm], axial_norm, &change, distance)
+        self.largest_around(center.holding, axial_norm, &change, distance)
     }
 }
 
 fn largest(forces: [f64; 8]) -> f64 {
     forces.into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+fn norm(forces: [f64; 8]) -> f64 {
+    forces.iter().map(|force| force * force).sum::<f64>().sqrt()
 }
 
 /// Proof that the drives can give what a stop takes.
@@ -205,15 +216,14 @@ impl ForceProof {
         ball.factor(distance) * wrench + axial <= self.bounds.holding
     }
 
-    /// Whether the loads of a ball are known; computes them if the effort suffices.
+    /// Loads at the centre of a ball, computed if the effort suffices.
     #[inline(always)]
-    fn knows(&mut self, constants: &Constants, ball: &mut BallLoads) -> bool {
-        if ball.is_known {
-            return true;
+    fn center_loads(&mut self, constants: &Constants, ball: &mut BallLoads) -> Option<CenterLoads> {
+        if ball.at_center.is_none() && self.evaluations_left > 0 {
+            self.evaluations_left -= 1;
+            ball.evaluate(constants);
         }
-        let is_allowed = self.evaluations_left > 0;
-        self.evaluations_left = self.evaluations_left.saturating_sub(1);
-        is_allowed && ball.evaluate(constants)
+        ball.at_center
     }
 
     /// Whether the drives can give what the stop takes, at every pose within a distance from the centre of a
@@ -229,13 +239,11 @@ impl ForceProof {
         if self.is_generous(ball, distance) {
             return true;
         }
-        if !self.knows(constants, ball) {
-            return false;
-        }
+        let Some(center) = self.center_loads(constants, ball) else { return false };
         let peaks = match self.at_center {
             Some((known, peaks)) if known == index => peaks,
             _ => {
-                let peaks = peaks(simd, &ball.loads, &self.demand.accelerations);
+                let peaks = peaks(simd, &center.loads, &self.demand.accelerations);
                 self.at_center.insert((index, peaks)).1
             }
         };
@@ -248,7 +256,7 @@ impl ForceProof {
             ForceBound { wrench: at_rest.wrench + moving.wrench, axial: at_rest.axial + moving.axial };
         let axial_norm = changes.axial_norm(&motion);
         ball.largest_around(peaks, axial_norm, &change, distance) <= self.bounds.moving
-            && ball.largest_held(changes, distance) <= self.bounds.holding + self.held_between_knots
+            && ball.largest_held(&center, changes, distance) <= self.bounds.holding + self.held_between_knots
     }
 
     /// Whether the drives can hold the platform at a distance from the centre of a ball.
@@ -260,8 +268,9 @@ impl ForceProof {
         distance: &CenterDistance,
     ) -> bool {
         self.is_generous(ball, distance)
-            || self.knows(constants, ball)
-                && ball.largest_held(&constants.force_changes, distance) <= self.bounds.holding
+            || self.center_loads(constants, ball).is_some_and(|center| {
+                ball.largest_held(&center, &constants.force_changes, distance) <= self.bounds.holding
+            })
     }
 }
 
@@ -284,5 +293,5 @@ fn peaks<S: Simd>(simd: S, loads: &DriveLoads, accelerations: &Pair<Acceleration
         }
     }
     let peaks = highest.max(-lowest);
-    [largest(peaks.to_array()), (peaks * peaks).to_array().into_iter().sum::<f64>().sqrt()]
+    [largest(peaks.to_array()), norm(peaks.to_array())]
 }

@@ -29,9 +29,8 @@ use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTE
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::position_ranges::PositionRanges;
 use crate::control::reference::proof::refusal::Refusal;
-use crate::control::reference::proof::regularity::{
-    REGULARITY_EFFORT, RegularBalls, Regularity, RegularityQuery,
-};
+use crate::control::reference::proof::regular_balls::RegularBalls;
+use crate::control::reference::proof::regularity::{REGULARITY_EFFORT, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
 use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING, BETWEEN_KNOTS_RATIO, ROUNDING};
 use crate::control::reference::stop::pose_stop::{

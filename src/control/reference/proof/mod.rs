@@ -9,13 +9,16 @@
 //! | `cubic_departure` | how far a quantity may depart from a cubic between two knots |
 //! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
 //! | `pose_bounds` | bounds of the leg lengths, and the envelope |
-//! | `regularity` | balls of poses proved regular, for the limit of the condition |
+//! | `regularity` | a ball of poses proved regular, for the limit of the condition |
+//! | `ball_group` | balls in SIMD lanes, and which of them cover a pose |
+//! | `regular_balls` | the balls that were found last |
 //! | `drive_forces` | whether the drives can give what a stop takes |
 //! | `refusal` | why a step is refused |
 //! | `tolerances` | allowances for rounding and between knots |
 //! | `padding` | vectors of three numbers in four lanes |
 
 pub(super) mod angle_ranges;
+pub(super) mod ball_group;
 pub(super) mod cubic_departure;
 pub(super) mod drive_forces;
 pub(super) mod examination;
@@ -24,6 +27,7 @@ pub(super) mod padding;
 pub(super) mod pose_bounds;
 pub(super) mod position_ranges;
 pub(super) mod refusal;
+pub(super) mod regular_balls;
 pub(super) mod regularity;
 pub(super) mod step;
 pub(super) mod tolerances;

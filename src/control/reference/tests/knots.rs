@@ -6,7 +6,7 @@ use fearless_simd::{Level, dispatch};
 use crate::control::reference::Refusal;
 use crate::control::reference::proof::examination::MAX_STEP_EFFORT;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::proof::regularity::RegularBalls;
+use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::{step::Step, verification::Verifier};
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::tests::verification::Scene;

@@ -2,7 +2,8 @@
 //! accepted.
 
 use crate::control::reference::proof::drive_forces::{ForceBounds, ForceProof, StopDemand};
-use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
+use crate::control::reference::proof::regular_balls::RegularBalls;
+use crate::control::reference::proof::regularity::{Regularity, RegularityQuery};
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::tests::*;
 

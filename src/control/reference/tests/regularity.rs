@@ -3,7 +3,7 @@
 
 use nalgebra::Vector6;
 
-use crate::control::reference::proof::regularity::RegularBalls;
+use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::tests::*;
 use crate::model::rigid::Twist;
 
