@@ -12,7 +12,7 @@ use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
 use hexad::control::law::input_matrix::InputMatrix;
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::errors::ErrorEstimate;
+use hexad::control::signals::errors::{ErrorEstimate, FeedbackAcceleration};
 use hexad::control::signals::limits::Limit;
 use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon;
@@ -65,7 +65,8 @@ pub fn answer(config: &Config, error: &Vector6<f64>) -> Vector6<f64> {
         rate: error * (by_w / period_s),
         disturbance: (error * (by_d / (period_s * period_s))).sup(&-largest).inf(&largest),
     };
-    parameters.law.feedback_acceleration(&estimate.after(0.6 * period_s, &Vector6::zeros()), &input_matrix)
+    let at_force = estimate.after(0.6 * period_s, &FeedbackAcceleration::default());
+    parameters.law.commanded_acceleration(&at_force, &input_matrix).0
 }
 
 /// A controller, a platform, and what is between them.

@@ -24,9 +24,9 @@ pub(in crate::control) fn actuate(
     let estimator = errors.estimator();
     let mut at_begin = *estimator.at_measurement();
     estimator.predict(&mut at_begin, begin_ns);
-    let wanted = parameters.law.feedback_acceleration(&at_begin, &constants.acceleration_by_command);
+    let wanted = parameters.law.commanded_acceleration(&at_begin, &constants.acceleration_by_command);
     let acceleration = feedback.limit(cycle, &desired.acceleration, &wanted);
-    let mut sent = constants.acceleration_by_command.platform_acceleration(&acceleration);
+    let mut sent = constants.acceleration_by_command.feedback_acceleration(&acceleration);
     let in_middle = at_begin.after(0.5 * parameters.period_s(), &sent);
     let error = errors.corrected_to_last_measurement(&in_middle);
     let motion = parameters.law.dynamics_motion(desired, &error, &acceleration);
@@ -36,7 +36,7 @@ pub(in crate::control) fn actuate(
         let (machine, missing) = (constants.machine(), &limited.wrench_error);
         let missing =
             constants.acceleration_by_command.acceleration_by_wrench(machine, &motion.pose, missing);
-        sent += missing;
+        sent.0 += missing.0;
         errors.record_removed_acceleration(constants, &missing);
     }
     errors.record_sent(begin_ns, &sent, &limited.force);

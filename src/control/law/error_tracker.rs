@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::law::estimator::{Estimator, EstimatorConstants};
+use crate::control::law::feedback_law::LegAccelerations;
 use crate::control::monitoring::disturbance_monitor::DisturbanceMonitor;
 use crate::control::monitoring::drive_response::DriveResponse;
 use crate::control::monitoring::frozen_sensors::FrozenSensors;
@@ -17,8 +18,7 @@ use crate::control::reference::ReferenceGenerator;
 use crate::control::sensing::localization::{Localization, Located};
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::ErrorEstimate;
-use crate::control::signals::errors::{ErrorCoordinates, PoseError};
+use crate::control::signals::errors::{ErrorCoordinates, ErrorEstimate, FeedbackAcceleration, PoseError};
 use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::leg_wrenches;
@@ -45,7 +45,7 @@ pub(in crate::control) struct ErrorTracker {
     disturbance: DisturbanceMonitor,
     /// Force that was sent last \[N\], and its feedback acceleration.
     sent: [f64; LEGS],
-    sent_acceleration: Vector6<f64>,
+    sent_acceleration: FeedbackAcceleration,
     /// Measured error; without a new measurement, the predicted error.
     error: PoseError,
     /// Measured minus estimated error, after the last measurement has corrected the estimate.
@@ -160,26 +160,34 @@ impl ErrorTracker {
     }
 
     /// Records the acceleration that force limits removed.
-    pub fn record_removed_acceleration(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
+    pub fn record_removed_acceleration(
+        &mut self,
+        constants: &Constants,
+        acceleration: &FeedbackAcceleration,
+    ) {
         self.disturbance.record_removed_acceleration(&constants.disturbance_bounds, acceleration);
     }
 
     /// Records force and feedback acceleration that are sent, after all limits, and the instant from which
     /// they act.
-    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>, force: &[f64; LEGS]) {
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &FeedbackAcceleration, force: &[f64; LEGS]) {
         (self.sent, self.sent_acceleration) = (*force, *acceleration);
         self.estimator.record_sent(begin_ns, acceleration);
     }
 }
 
 /// Leg forces of a feedback acceleration, each as if the other forces were constant.
-fn feedback_forces(constants: &Constants, acceleration: &Vector6<f64>, pose: &Pose) -> [f64; LEGS] {
+fn feedback_forces(
+    constants: &Constants,
+    FeedbackAcceleration(acceleration): &FeedbackAcceleration,
+    pose: &Pose,
+) -> [f64; LEGS] {
     let law = &constants.parameters.law;
     let of_legs = match law.mode.acts_on_legs() {
         true => *acceleration,
         false => leg_wrenches(constants.machine(), pose).tr_mul(acceleration),
     };
-    law.forces_of_leg_accelerations(&of_legs)
+    law.forces_of_leg_accelerations(&LegAccelerations(of_legs))
 }
 
 /// Checks each leg's innovation against its bound. The innovation of a leg is `N^T nu`, at most

@@ -28,8 +28,7 @@ use crate::control::law::gains::Gains;
 use crate::control::law::input_matrix::InputMatrix;
 use crate::control::law::leg_masses::LegMasses;
 use crate::control::law::mode::ControlMode;
-use crate::control::signals::errors::ErrorCoordinates;
-use crate::control::signals::errors::ErrorEstimate;
+use crate::control::signals::errors::{CommandedAcceleration, ErrorCoordinates, ErrorEstimate};
 use crate::control::signals::limits::Limits;
 use crate::control::signals::pair::Pair;
 use crate::model::LEGS;
@@ -38,6 +37,10 @@ use crate::model::fidelity::Gravity;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::TaskState;
+
+/// Accelerations of the legs \[m/s^2\].
+#[derive(Clone, Copy, Debug)]
+pub struct LegAccelerations(pub Vector6<f64>);
 
 /// Control law of one deployment: mode and gains.
 #[derive(Clone, Copy, Debug)]
@@ -111,19 +114,19 @@ impl Law {
         (all(first.stiffness, position.stiffness), all(first.damping, position.damping))
     }
 
-    /// Feedback acceleration `Kp e + Kd e' + B^-1 d`, from the estimate at the instant at which the force
+    /// Commanded acceleration `Kp e + Kd e' + B^-1 d`, from the estimate at the instant at which the force
     /// begins.
-    pub fn feedback_acceleration(
+    pub fn commanded_acceleration(
         &self,
         estimate: &ErrorEstimate,
         input_matrix: &InputMatrix,
-    ) -> Vector6<f64> {
+    ) -> CommandedAcceleration {
         let (stiffness, damping) = self.gains();
         let feedback = estimate.value.component_mul(&stiffness) + estimate.rate.component_mul(&damping);
         if !self.compensates_disturbance {
-            return feedback;
+            return CommandedAcceleration(feedback);
         }
-        feedback + input_matrix.command(&estimate.disturbance)
+        CommandedAcceleration(feedback + input_matrix.command(&estimate.disturbance))
     }
 
     /// Motion whose forces the mode commands. Computed torque: the predicted pose (reference minus predicted
@@ -134,7 +137,7 @@ impl Law {
         &self,
         desired: Motion,
         error: &ErrorCoordinates,
-        acceleration: &Vector6<f64>,
+        CommandedAcceleration(acceleration): &CommandedAcceleration,
     ) -> Motion {
         if self.mode.acts_on_legs() {
             return desired;
@@ -151,7 +154,10 @@ impl Law {
     }
 
     /// Drive forces `m_i a_i` for leg accelerations, with the effective mass of each drive.
-    pub fn forces_of_leg_accelerations(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
+    pub fn forces_of_leg_accelerations(
+        &self,
+        LegAccelerations(acceleration): &LegAccelerations,
+    ) -> [f64; LEGS] {
         acceleration.component_mul(&self.leg_masses.mass).into()
     }
 }

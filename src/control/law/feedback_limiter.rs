@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::CommandedAcceleration;
 use crate::model::rigid::Acceleration;
 
 #[cfg(not(feature = "client"))]
@@ -49,8 +50,8 @@ impl FeedbackLimiter {
         &mut self,
         cycle: &Cycle<'_>,
         desired: &Acceleration,
-        wanted: &Vector6<f64>,
-    ) -> Vector6<f64> {
+        CommandedAcceleration(wanted): &CommandedAcceleration,
+    ) -> CommandedAcceleration {
         let parameters = &cycle.constants.parameters;
         let limited = match parameters.law.mode.acts_on_legs() {
             true => scale_leg_accelerations(cycle, wanted),
@@ -58,7 +59,7 @@ impl FeedbackLimiter {
         };
         let rate = if limited != *wanted { 1.0 } else { -FORGETTING_RATIO };
         self.saturated_s = (self.saturated_s + rate * parameters.period_s()).max(0.0);
-        limited
+        CommandedAcceleration(limited)
     }
 }
 

@@ -17,6 +17,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::control::law::leg_masses::LegMasses;
 use crate::control::law::mode::ControlMode;
+use crate::control::signals::errors::{CommandedAcceleration, FeedbackAcceleration};
 use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
@@ -53,9 +54,12 @@ impl InputMatrix {
         Self { mobility, acts_on_legs, matrix_and_inverse }
     }
 
-    /// Acceleration of the platform for an acceleration that the law commands: `B a`.
-    pub fn platform_acceleration(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
-        self.matrix_and_inverse.map_or(*commanded, |[matrix, _]| matrix * commanded)
+    /// Acceleration of the error for an acceleration that the law commands: `B a`.
+    pub fn feedback_acceleration(
+        &self,
+        CommandedAcceleration(a): &CommandedAcceleration,
+    ) -> FeedbackAcceleration {
+        FeedbackAcceleration(self.matrix_and_inverse.map_or(*a, |[matrix, _]| matrix * a))
     }
 
     /// Largest disturbance of each axis that a law with this acceleration bound can compensate.
@@ -67,9 +71,17 @@ impl InputMatrix {
     /// N is taken at the pose, because near flat legs a force moves the platform far less than at home.
     // Rarely called, hence out of line: the cycle stays short.
     #[inline(never)]
-    pub fn acceleration_by_wrench(&self, machine: &Machine, pose: &Pose, wrench: &Wrench) -> Vector6<f64> {
+    pub fn acceleration_by_wrench(
+        &self,
+        machine: &Machine,
+        pose: &Pose,
+        wrench: &Wrench,
+    ) -> FeedbackAcceleration {
         let acceleration = self.mobility * wrench.vector();
-        if self.acts_on_legs { leg_wrenches(machine, pose).tr_mul(&acceleration) } else { acceleration }
+        FeedbackAcceleration(match self.acts_on_legs {
+            true => leg_wrenches(machine, pose).tr_mul(&acceleration),
+            false => acceleration,
+        })
     }
 
     /// Acceleration by a unit force of each leg at a pose, one column per leg, in error coordinates.
@@ -89,9 +101,9 @@ impl InputMatrix {
         inertia * of_legs.try_inverse().unwrap_or_default()
     }
 
-    /// Acceleration that the law must command for an acceleration of the platform: `B^-1 a`.
-    pub fn command(&self, acceleration: &Vector6<f64>) -> Vector6<f64> {
-        self.matrix_and_inverse.map_or(*acceleration, |[_, inverse]| inverse * acceleration)
+    /// Acceleration that the law must command against a disturbance: `B^-1 d`.
+    pub fn command(&self, disturbance: &Vector6<f64>) -> Vector6<f64> {
+        self.matrix_and_inverse.map_or(*disturbance, |[_, inverse]| inverse * disturbance)
     }
 }
 

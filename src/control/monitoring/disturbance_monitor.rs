@@ -29,7 +29,7 @@ use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::input_matrix::InputMatrix;
 use crate::control::parameters::Parameters;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::ErrorEstimate;
+use crate::control::signals::errors::{ErrorEstimate, FeedbackAcceleration};
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Acceleration, Motion};
@@ -190,8 +190,12 @@ struct Oscillation {
 
 impl DisturbanceMonitor {
     /// Records the acceleration by forces that limits removed.
-    pub fn record_removed_acceleration(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
-        self.removed_acceleration = self.removed_acceleration.max(bounds.norm_squared(acceleration).sqrt());
+    pub fn record_removed_acceleration(
+        &mut self,
+        bounds: &DisturbanceBounds,
+        FeedbackAcceleration(removed): &FeedbackAcceleration,
+    ) {
+        self.removed_acceleration = self.removed_acceleration.max(bounds.norm_squared(removed).sqrt());
     }
 
     /// Checks the estimate after a measurement, `dt` seconds after the previous one. `sudden_squared` is the

@@ -5,7 +5,7 @@ use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use crate::control::law::estimator::{EstimatorConstants, KalmanFilter};
-use crate::control::signals::errors::ErrorCoordinates;
+use crate::control::signals::errors::{ErrorCoordinates, FeedbackAcceleration};
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
@@ -36,7 +36,7 @@ impl LegRateEstimator {
         };
         let dt = elapsed_s(filter);
         if dt > 0.0 {
-            filter.state.advance(dt, &Vector6::zeros());
+            filter.state.advance(dt, &FeedbackAcceleration::default());
             filter.correct(constants, time_ns, &measured);
         }
         filter.state.rate.into()

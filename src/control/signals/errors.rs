@@ -64,6 +64,15 @@ impl From<&ErrorCoordinates> for PoseError {
     }
 }
 
+/// Acceleration that the law commands, before the coupling of the legs: of the platform \[rad/s^2, m/s^2\], or of
+/// each leg \[m/s^2\] in modes that act on legs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CommandedAcceleration(pub Vector6<f64>);
+
+/// Acceleration u by feedback forces, in the coordinates of the error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FeedbackAcceleration(pub Vector6<f64>);
+
 /// Estimate of error, rate and disturbance at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEstimate {
@@ -77,14 +86,14 @@ pub struct ErrorEstimate {
 
 impl ErrorEstimate {
     /// Advances the estimate by `dt` seconds, in which feedback accelerates the platform by u.
-    pub fn advance(&mut self, dt: f64, u: &Vector6<f64>) {
+    pub fn advance(&mut self, dt: f64, FeedbackAcceleration(u): &FeedbackAcceleration) {
         let acceleration = self.disturbance - u;
         self.value += (self.rate + acceleration * (0.5 * dt)) * dt;
         self.rate += acceleration * dt;
     }
 
     /// Estimate `dt` seconds later.
-    pub fn after(&self, dt: f64, u: &Vector6<f64>) -> Self {
+    pub fn after(&self, dt: f64, u: &FeedbackAcceleration) -> Self {
         let mut after = *self;
         after.advance(dt, u);
         after

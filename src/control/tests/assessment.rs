@@ -9,7 +9,7 @@ use crate::control::setpoint::motion::SetpointMotion;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::PoseError;
+use crate::control::signals::errors::{CommandedAcceleration, PoseError};
 use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
@@ -169,7 +169,7 @@ fn each_finding_alone_ends_the_tracking() {
         let constants = Constants::new(&machine, parameters(&machine));
         let cycle = Cycle { constants: &constants, release_ns: 0, state };
         for _ in 0..102 {
-            feedback.limit(&cycle, &Acceleration::default(), &Vector6::repeat(1e3));
+            feedback.limit(&cycle, &Acceleration::default(), &CommandedAcceleration(Vector6::repeat(1e3)));
         }
         let saturated = Some(DiagnosticCode::FeedbackSaturated);
         assert_eq!(Scene { feedback, ..Scene::default() }.tracking(state), saturated);

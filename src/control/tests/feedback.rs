@@ -7,6 +7,7 @@ use crate::control::cycle::Cycle;
 use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::law::forces::forces;
 use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::errors::CommandedAcceleration;
 use crate::control::signals::state::State;
 use crate::control::tests::*;
 use crate::model::rigid::{Acceleration, Motion};
@@ -36,7 +37,7 @@ fn feedback_keeps_its_direction_and_takes_the_largest_share_within_the_bound() {
         let added =
             Acceleration { angular: samples.vector(angular * scale), linear: samples.vector(linear * scale) };
         let mut bound = FeedbackLimiter::default();
-        let limited = bound.limit(&cycle(&constants), &desired, &added.vector());
+        let limited = bound.limit(&cycle(&constants), &desired, &CommandedAcceleration(added.vector())).0;
         let got = Acceleration::from_vector(&limited);
         let mut is_saturated = false;
         for (desired, added, got, limit) in [
@@ -64,7 +65,8 @@ fn feedback_on_legs_is_scaled_by_the_leg_that_exceeds_its_bound_most() {
             let mut wanted = bounds * 0.3;
             wanted[leg] = ratio * bounds[leg];
             let mut bound = FeedbackLimiter::default();
-            let got = bound.limit(&cycle(&constants), &Acceleration::default(), &wanted);
+            let commanded = CommandedAcceleration(wanted);
+            let got = bound.limit(&cycle(&constants), &Acceleration::default(), &commanded).0;
             let expected = if is_saturated { wanted / ratio.abs() } else { wanted };
             assert!((got - expected).norm() < 1e-12 && (got != wanted) == is_saturated);
         }
@@ -79,7 +81,7 @@ fn saturation_that_lasts_is_a_fault() {
         let mut bound = FeedbackLimiter::default();
         (0..cycles).find(|k| {
             let wanted = if pattern(*k) { Vector6::repeat(1e3) } else { Vector6::zeros() };
-            bound.limit(&cycle(&constants), &Acceleration::default(), &wanted);
+            bound.limit(&cycle(&constants), &Acceleration::default(), &CommandedAcceleration(wanted));
             bound.check_saturation_time().is_err()
         })
     };
@@ -100,7 +102,8 @@ fn a_force_that_is_not_finite_is_refused() {
     for mode in ControlMode::ALL {
         let constants = constants(mode);
         let motion = TaskState::at_rest(constants.machine().home).motion();
-        let with = |motion: &Motion, acceleration| forces(&constants, motion, &acceleration);
+        let with =
+            |motion: &Motion, acceleration| forces(&constants, motion, &CommandedAcceleration(acceleration));
         assert!(with(&motion, Vector6::zeros()).is_ok(), "{mode:?}");
         for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for k in 0..6 {

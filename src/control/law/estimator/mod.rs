@@ -31,8 +31,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::law::estimator::covariance::{Covariance, NoiseModel};
 pub use crate::control::law::estimator::sent_accelerations::CAPACITY as SENT_ACCELERATIONS;
 use crate::control::law::estimator::sent_accelerations::SentAccelerations;
-use crate::control::signals::errors::ErrorCoordinates;
-use crate::control::signals::errors::ErrorEstimate;
+use crate::control::signals::errors::{ErrorCoordinates, ErrorEstimate, FeedbackAcceleration};
 use crate::control::signals::time::seconds_between;
 
 impl ErrorEstimate {
@@ -194,7 +193,7 @@ impl Estimator {
     }
 
     /// Records the feedback acceleration that is sent, after all limits, and the instant from which it acts.
-    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &FeedbackAcceleration) {
         self.sent.record(begin_ns, acceleration);
     }
 }

@@ -3,20 +3,20 @@
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
-use crate::control::signals::errors::ErrorEstimate;
+use crate::control::signals::errors::{ErrorEstimate, FeedbackAcceleration};
 use crate::control::signals::time::seconds_between;
 
 /// Number of accelerations kept, a power of two. At 10 kHz they cover 25 ms, the longest delay of the drives
 /// plus age of a measurement.
 pub const CAPACITY: usize = 256;
 
-const ZERO: Vector6<f64> = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+const ZERO: FeedbackAcceleration = FeedbackAcceleration(Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
 
 /// Acceleration, and the instant from which it acts.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct SentAcceleration {
     begin_ns: u64,
-    acceleration: Vector6<f64>,
+    acceleration: FeedbackAcceleration,
 }
 
 /// Ring buffer of the last accelerations.
@@ -41,7 +41,7 @@ impl SentAccelerations {
     }
 
     /// Records an acceleration that acts from an instant on.
-    pub fn record(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
+    pub fn record(&mut self, begin_ns: u64, acceleration: &FeedbackAcceleration) {
         if let Some(slot) = self.ring.get_mut(self.total_recorded % CAPACITY) {
             *slot = SentAcceleration { begin_ns, acceleration: *acceleration };
         }

@@ -103,7 +103,7 @@ fn an_impact_is_brief() {
 
 #[test]
 fn what_limits_took_away_is_no_change() {
-    let along_z = |value: f64| Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value);
+    let along_z = |value: f64| FeedbackAcceleration(Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value));
     let changed = |limited: f64, disturbance: f64| {
         let mut monitor = DisturbanceMonitor::default();
         (0..2000).find_map(|cycle| {
