@@ -326,7 +326,8 @@ impl ReferenceGenerator {
         desired: &RelativeMotion,
         h: f64,
     ) -> (Acceleration, u32) {
-        let limits = target.limits(&constants.parameters.limits).with_accelerations_scaled(self.strength);
+        let limits = target.limits(&constants.parameters.limits, &self.motion.acceleration);
+        let limits = limits.with_accelerations_scaled(self.strength);
         let closing_scale = target.closing_scale(self.closing_scale);
         let approach = |limits| Approach::new(limits, closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));

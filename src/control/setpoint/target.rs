@@ -70,12 +70,20 @@ impl<'a> Target<'a> {
         if let Self::Pose { .. } = self { 1.0 } else { scale }
     }
 
-    /// Limits for the way to the target.
-    pub(in crate::control) fn limits(&self, limits: &Limits) -> Limits {
-        match self {
-            Self::Motion(_) | Self::Samples(_) => *limits,
-            Self::Pose { speed_share, .. } => limits.scaled(limits.autonomous_scale * speed_share),
+    /// Limits for the way to the target. An acceleration beyond them, such as that of a stop before a bound, ends
+    /// with the whole jerk: with a share of it the platform would bounce off the bound.
+    pub(in crate::control) fn limits(&self, limits: &Limits, present: &Acceleration) -> Limits {
+        let Self::Pose { speed_share, .. } = self else { return *limits };
+        let mut share = limits.scaled(limits.autonomous_scale * speed_share);
+        for (share, whole, present) in [
+            (&mut share.orientation, &limits.orientation, &present.angular),
+            (&mut share.position, &limits.position, &present.linear),
+        ] {
+            if present.norm_squared() > share.acceleration * share.acceleration {
+                share.jerk = whole.jerk;
+            }
         }
+        share
     }
 }
 
@@ -105,7 +113,8 @@ mod tests {
             for (kind, scale) in [(SetpointKind::Target, 0.5 * share), (SetpointKind::Motion, 1.0)] {
                 let setpoint = Setpoint { kind, target_speed, ..Setpoint::default() };
                 let (setpoint, samples) = (SetpointMotion::new(setpoint), PoseSamples::default());
-                let found = Target::of_setpoint(&setpoint, &samples).limits(&limits);
+                let found =
+                    Target::of_setpoint(&setpoint, &samples).limits(&limits, &Acceleration::default());
                 assert_eq!(
                     (found.position.jerk, found.orientation.velocity),
                     (scale, scale),
