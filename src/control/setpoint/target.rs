@@ -26,6 +26,9 @@ pub enum Target<'a> {
 /// Least share of the limits of autonomous motions: with less, the approach loses its numerical precision.
 const MIN_TARGET_SPEED: f64 = 0.01;
 
+/// Ratio from which an acceleration is beyond a limit by more than rounding.
+const NOTABLY: f64 = 1.1;
+
 impl<'a> Target<'a> {
     /// Target that a valid setpoint requests.
     pub fn of_setpoint(setpoint: &'a SetpointMotion, samples: &'a PoseSamples) -> Self {
@@ -79,7 +82,8 @@ impl<'a> Target<'a> {
             (&mut share.orientation, &limits.orientation, &present.angular),
             (&mut share.position, &limits.position, &present.linear),
         ] {
-            if present.norm_squared() > share.acceleration * share.acceleration {
+            let notable = NOTABLY * share.acceleration;
+            if present.norm_squared() > notable * notable {
                 share.jerk = whole.jerk;
             }
         }
