@@ -31,4 +31,5 @@ mod stamps;
 mod targets;
 mod tracking;
 mod trust;
+mod unstated;
 mod weak_poses;

@@ -10,11 +10,18 @@ use super::bound::Bound;
 use super::geometry;
 use super::reader::SectionReader;
 use crate::model::LEGS;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Fidelity;
 use crate::model::machine::{Actuator, Joints, Link, Machine, Platform, TransverseInertia};
 use crate::model::task::TaskState;
 
 /// Largest gravity \[m/s^2\]: ten times the Earth's is a wrong unit, not a site.
 const MAX_GRAVITY_M_S2: f64 = 100.0;
+
+/// Key of the friction that the file does not state, and its default as shares of forces.
+const FRICTION_UNCERTAINTY: &str = "friction_uncertainty_n";
+const USUAL_FRICTION_PER_MAX_FORCE: f64 = 0.03;
+const USUAL_FRICTION_PER_HOLDING: f64 = 0.2;
 
 /// Relative tolerance of the triangle inequalities: a flat plate and a thin disc meet them with equality,
 /// and the digits of a file round them to either side.
@@ -36,7 +43,9 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
         root.reject("gravity_m_s2", format!("must be at most {MAX_GRAVITY_M_S2} long"));
     }
     let platform = platform(root.section("platform"));
-    let actuator = actuator(root.section("actuator"));
+    let section = root.section("actuator");
+    let is_friction_stated = section.has(FRICTION_UNCERTAINTY);
+    let actuator = actuator(section);
     let cylinder = link(root.section("cylinder"), &actuator);
     let rod = link(root.section("rod"), &actuator);
     let mut home = root.section("home");
@@ -51,7 +60,10 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
         &of_leg(|leg| leg.universal_axis),
         &TaskState::at_rest(home_pose).motion().pose,
     );
-    let machine = Machine { gravity, platform, joints, cylinder, rod, actuator, home: home_pose, level };
+    let mut machine = Machine { gravity, platform, joints, cylinder, rod, actuator, home: home_pose, level };
+    if !is_friction_stated {
+        machine.actuator.friction_uncertainty = usual_friction_uncertainty(&machine);
+    }
     geometry::check(&machine, &legs, &home);
     home.finish();
     legs.into_iter().for_each(|leg| leg.reader.finish());
@@ -87,6 +99,15 @@ fn check_inertia(section: &SectionReader, inertia: &Matrix3<f64>) {
     }
 }
 
+/// Friction that a file without `actuator.friction_uncertainty_n` may lack \[N\]: a share of the largest force, at most
+/// a share of the largest force that holds the platform at home.
+fn usual_friction_uncertainty(machine: &Machine) -> f64 {
+    let at_home = TaskState::at_rest(machine.home).motion();
+    let held = InverseDynamics::new(machine).forces_of(Fidelity::Gravity, &at_home).unwrap_or_default();
+    let largest = held.into_iter().map(f64::abs).fold(0.0, f64::max);
+    (USUAL_FRICTION_PER_MAX_FORCE * machine.actuator.max_force).min(USUAL_FRICTION_PER_HOLDING * largest)
+}
+
 fn actuator(mut section: SectionReader) -> Actuator {
     let actuator = Actuator {
         min_length: section.number("min_length_m", Bound::Positive),
@@ -96,6 +117,7 @@ fn actuator(mut section: SectionReader) -> Actuator {
         reflected_mass: section.number_or("reflected_mass_kg", 0.0, Bound::NotNegative),
         viscous_friction: section.number_or("viscous_friction_n_s_m", 0.0, Bound::NotNegative),
         coulomb_friction: section.number_or("coulomb_friction_n", 0.0, Bound::NotNegative),
+        friction_uncertainty: section.number_or(FRICTION_UNCERTAINTY, 0.0, Bound::NotNegative),
         coulomb_smoothing: Actuator::COULOMB_SMOOTHING_M_S,
     };
     if actuator.max_length <= actuator.min_length {

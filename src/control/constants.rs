@@ -86,23 +86,14 @@ impl Constants {
         let least_missing_acceleration_squared =
             if mode.includes_inertia() { least_missing * least_missing } else { f64::INFINITY };
         let unbounded = Vector6::repeat(f64::INFINITY);
-        let disturbance_bounds = DisturbanceBounds::new(
-            machine,
-            &parameters,
-            &acceleration_by_command,
-            least_missing,
-            angle_weighting_radius_m,
-        );
+        let disturbance_bounds =
+            DisturbanceBounds::new(machine, &parameters, &acceleration_by_command, angle_weighting_radius_m);
         Self {
             disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
             acceleration_by_command,
             least_missing_acceleration_squared,
-            frozen_leg: FrozenLegBounds::new(
-                parameters.law.position.stiffness,
-                machine.actuator.max_force,
-                period_s,
-            ),
+            frozen_leg: FrozenLegBounds::new(parameters.law.position.stiffness, &machine.actuator, period_s),
             estimator: EstimatorConstants::new(
                 parameters.noise,
                 parameters.reading_errors,

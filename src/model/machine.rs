@@ -217,6 +217,8 @@ pub struct Actuator {
     pub viscous_friction: f64,
     /// Coulomb friction \[N\].
     pub coulomb_friction: f64,
+    /// Largest dry friction that the model may lack \[N\]. The checks under control permit it.
+    pub friction_uncertainty: f64,
     /// Speed above which the Coulomb force has its full value \[m/s\]; below it the force is proportional to
     /// speed.
     pub coulomb_smoothing: f64,

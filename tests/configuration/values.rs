@@ -92,7 +92,8 @@ fn single_values_are_refused_with_key_value_and_bound() {
     );
     refused("max_force_n = 500.0", "max_force_n = 0", "actuator.max_force_n = 0: must be greater than 0");
     refused("max_rate_m_s = 2.0", "max_rate_m_s = 0", "actuator.max_rate_m_s = 0: must be greater than 0");
-    for key in ["reflected_mass_kg", "viscous_friction_n_s_m", "coulomb_friction_n"] {
+    for key in ["reflected_mass_kg", "viscous_friction_n_s_m", "coulomb_friction_n", "friction_uncertainty_n"]
+    {
         refused(
             "max_force_n = 500.0\n",
             &format!("max_force_n = 500.0\n{key} = -1e-3\n"),
@@ -120,7 +121,7 @@ fn keys_are_refused_when_missing_unknown_or_of_the_wrong_shape() {
         "min_length_m = 0.85",
         "min_length_m = 0.85\nmin_lenght_m = 0.85",
         "actuator.min_lenght_m = 0.85: unknown key, must be one of: min_length_m, max_length_m, \
-         max_rate_m_s, max_force_n, reflected_mass_kg, viscous_friction_n_s_m, coulomb_friction_n",
+         max_rate_m_s, max_force_n, reflected_mass_kg, viscous_friction_n_s_m, coulomb_friction_n, friction_uncertainty_n",
     );
     refused(
         "reference_length_m = 0.83 }",

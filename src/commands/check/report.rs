@@ -53,6 +53,8 @@ pub struct CheckReport {
     /// Largest changes of payload and disturbance that are no fault; null if any is allowed.
     pub payload_change_kg: f64,
     pub disturbance_step_m_s2: f64,
+    /// Friction of a leg that the checks permit beyond the model.
+    pub friction_uncertainty_n: f64,
     /// Slowest and fastest mode of legs with separate control.
     pub leg_modes_hz: Option<[f64; 2]>,
     pub loops: Vec<LoopMargins>,
@@ -135,6 +137,7 @@ impl CheckReport {
             compensates_disturbances: control.compensate_disturbances,
             payload_change_kg: constants.disturbance_bounds.max_payload_change_kg,
             disturbance_step_m_s2: constants.disturbance_bounds.max_sudden_disturbance,
+            friction_uncertainty_n: machine.actuator.friction_uncertainty,
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_age_s(deployment),

@@ -56,8 +56,9 @@ impl CheckReport {
         )?;
         writeln!(
             f,
-            "disturbances that are no fault: up to {:.2} kg of changed payload, a sudden push of up to {:.2} m/s^2",
-            self.payload_change_kg, self.disturbance_step_m_s2
+            "disturbances that are no fault: up to {:.2} kg of changed payload, a sudden push of up to {:.2} m/s^2, \
+             {:.2} N of friction in legs that turn around",
+            self.payload_change_kg, self.disturbance_step_m_s2, self.friction_uncertainty_n
         )?;
         if let Some([softest, stiffest]) = self.leg_modes_hz {
             writeln!(f, "legs         coupled, they move with {softest:.2} to {stiffest:.2} Hz")?;

@@ -10,7 +10,9 @@ use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
 use crate::control::law::ControlMode;
+use crate::control::law::input_matrix::InputMatrix;
 use crate::control::law::leg_masses::LegMasses;
+use crate::control::signals::pair::Pair;
 use crate::control::signals::state::AfterStop;
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
@@ -41,6 +43,9 @@ const MAX_FOLLOWING_RAD: f64 = 1.0;
 /// Default of the largest velocity errors over the velocity limits: far above the noise of rates, and reached by a free
 /// fall within hundredths of a second.
 const DEFAULT_VELOCITY_ERROR_RATIO: f64 = 0.3;
+/// The same for unstated friction: times its step of acceleration over the natural frequency. A step without stiction
+/// causes 0.4, a leg that sticks and slips up to 1.1 (2026-11-26).
+const VELOCITY_ERROR_BY_FRICTION: f64 = 1.5;
 
 /// Section `[control]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,6 +132,8 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
             (orientation_bandwidth_hz, with(orientation_damping_ratio), 1.0),
         ]
     };
+    let by_friction =
+        velocity_errors_by_friction(machine, &leg_masses, [orientation_bandwidth_hz, position_bandwidth_hz]);
     let mut up_to = |key, default, most| section.number_or(key, default, Bound::UpTo(most));
     let control = Control {
         mode,
@@ -140,12 +147,12 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         following_orientation_rad: up_to("following_orientation_rad", 0.05, MAX_FOLLOWING_RAD),
         following_velocity_m_s: section.number_or(
             "following_velocity_m_s",
-            DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.position.velocity,
+            by_friction.linear.max(DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.position.velocity),
             Bound::Positive,
         ),
         following_velocity_rad_s: section.number_or(
             "following_velocity_rad_s",
-            DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.orientation.velocity,
+            by_friction.angular.max(DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.orientation.velocity),
             Bound::Positive,
         ),
         fidelity: fidelity(&mut section),
@@ -162,6 +169,23 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     };
     section.finish();
     control
+}
+
+/// Largest velocity errors of the platform where unstated friction of all legs reverses at once, in loops of these
+/// bandwidths.
+fn velocity_errors_by_friction(
+    machine: &Machine,
+    masses: &LegMasses,
+    [turn_hz, shift_hz]: [f64; 2],
+) -> Pair<f64> {
+    let input_matrix = InputMatrix::at_home(machine, ControlMode::ComputedTorque, masses, Fidelity::Exact);
+    let by_force = input_matrix.acceleration_by_force(machine, &machine.home_pose());
+    let reversal = 2.0 * machine.actuator.friction_uncertainty;
+    let of = |first: usize, hertz: f64| {
+        let columns = by_force.column_iter().map(|column| column.fixed_rows::<3>(first).norm());
+        VELOCITY_ERROR_BY_FRICTION * reversal * columns.sum::<f64>() / (TAU * hertz)
+    };
+    Pair { angular: of(0, turn_hz), linear: of(3, shift_hz) }
 }
 
 fn fidelity(section: &mut SectionReader) -> FidelityChoice {

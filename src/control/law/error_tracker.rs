@@ -14,13 +14,14 @@ use crate::control::law::feedback_law::LegAccelerations;
 use crate::control::monitoring::disturbance_monitor::DisturbanceMonitor;
 use crate::control::monitoring::drive_response::DriveResponse;
 use crate::control::monitoring::frozen_sensors::FrozenSensors;
+use crate::control::monitoring::unstated_friction::UnstatedFriction;
 use crate::control::reference::ReferenceGenerator;
 use crate::control::sensing::localization::{Localization, Located};
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::{ErrorCoordinates, ErrorEstimate, FeedbackAcceleration, PoseError};
 use crate::model::LEGS;
-use crate::model::inverse_geometry::leg_lengths;
+use crate::model::inverse_geometry::{leg_lengths, leg_lengths_and_rates};
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::{Motion, Pose, Twist};
 
@@ -43,6 +44,7 @@ pub(in crate::control) struct ErrorTracker {
     sensors: FrozenSensors,
     drives: DriveResponse,
     disturbance: DisturbanceMonitor,
+    friction: UnstatedFriction,
     /// Force that was sent last \[N\], and its feedback acceleration.
     sent: [f64; LEGS],
     sent_acceleration: FeedbackAcceleration,
@@ -64,6 +66,7 @@ impl ErrorTracker {
         (self.sensors, self.drives, self.measurement_diagnostic) =
             (FrozenSensors::default(), DriveResponse::default(), None);
         (self.disturbance, self.disturbance_diagnostic) = (DisturbanceMonitor::default(), None);
+        self.friction = UnstatedFriction::default();
         (self.error, self.post_fit_residual) = (PoseError::default(), Vector6::zeros());
         self.error
     }
@@ -77,7 +80,7 @@ impl ErrorTracker {
         localization: &Localization,
         located: &Located<'_>,
     ) -> (PoseError, Twist) {
-        let Self { estimator, sensors, drives, disturbance, sent, sent_acceleration, .. } = self;
+        let Self { estimator, sensors, drives, disturbance, friction, sent, sent_acceleration, .. } = self;
         let constants = cycle.constants;
         let time_ns = located.measurement.time_ns;
         let desired = reference.motion_at(time_ns);
@@ -100,12 +103,16 @@ impl ErrorTracker {
                 drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
             };
             self.measurement_diagnostic = check().err();
+            if constants.machine().actuator.friction_uncertainty > 0.0 {
+                let (_, rates) = leg_lengths_and_rates(constants.machine(), &desired.pose, &desired.twist);
+                friction.update(&rates, interval_s);
+            }
             self.disturbance_diagnostic = disturbance
                 .check(
                     &constants.disturbance_bounds,
                     estimator.at_measurement(),
                     &desired,
-                    drives.sudden_disturbance_squared,
+                    (&drives.sudden_disturbance, friction),
                     interval_s,
                 )
                 .err();

@@ -12,6 +12,7 @@
 //! oscillation   e reverses by more than a bound, four times in a row, each within a period of the loop
 //! ```
 //!
+//! The bounds of payload and impact grow by what friction may explain, see [`super::unstated_friction`].
 //! A payload that is present when control begins is no fault. After an impact or a payload change the
 //! platform is still under control, and it stops. Angles are weighted by the radius of the platform.
 //!
@@ -27,24 +28,28 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::input_matrix::InputMatrix;
+use crate::control::monitoring::unstated_friction::{FrictionEffects, UnstatedFriction};
+use crate::control::monitoring::weighting::weighted;
 use crate::control::parameters::Parameters;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::{ErrorEstimate, FeedbackAcceleration};
-use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::LEGS;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Acceleration, Motion};
 
+/// Time constant of the usual disturbance \[s\], several times the estimator's.
+pub(in crate::control) const USUAL_DISTURBANCE_S: f64 = 0.15;
 /// Time constants of the present and the usual payload \[s\].
 const PAYLOAD_TIME_CONSTANT_S: f64 = 0.03;
-const USUAL_PAYLOAD_TIME_CONSTANT_S: f64 = 1.0;
+pub(in crate::control) const USUAL_PAYLOAD_S: f64 = 1.0;
 /// Time from the start of control in which any payload is usual, and in which swings decay \[s\].
 const START_S: f64 = 1.0;
-/// Default of `limits.payload_change_kg`, relative to the mass of the platform and to the mass that all
-/// drives can lift: friction that the model lacks looks like a payload.
+/// Default of `limits.payload_change_kg`, relative to the mass of the platform and to the mass that unstated
+/// friction of all legs looks like.
 const DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS: f64 = 0.1;
-const DEFAULT_PAYLOAD_CHANGE_PER_LIFT: f64 = 0.02;
+const DEFAULT_PAYLOAD_CHANGE_PER_FRICTION: f64 = 0.67;
 /// Time constant with which removed forces are forgotten \[s\]: the same as for the usual payload.
-const CUT_FORCE_DECAY_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
+const CUT_FORCE_DECAY_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_S;
 /// Smallest weight in a motion, relative to the weight at rest: a falling platform has no weight to compare
 /// with.
 const LEAST_APPARENT_GRAVITY_RATIO: f64 = 0.3;
@@ -77,6 +82,8 @@ const SHAKING_RATIO_WITHOUT_INERTIA: f64 = 4.0;
 /// The same ratio for a sudden disturbance that `[limits]` permits. A force that switches at 5 to 10 Hz
 /// causes 0.9 (2026-11-23).
 const MAX_SWING_BY_DISTURBANCE_STEP: f64 = 1.5;
+/// The same ratio for friction of legs that turned around.
+const MAX_SWING_BY_FRICTION: f64 = 0.4;
 /// Rate at which the reference's shaking is forgotten, relative to the rate at which its slow part follows.
 const FORGETTING_RATIO: f64 = 0.3;
 
@@ -97,22 +104,19 @@ pub struct DisturbanceBounds {
     swing: f64,
     /// Swing of the error per acceleration of the reference \[m / (m/s^2)\].
     swing_by_acceleration: f64,
+    /// Swing of the error per acceleration by friction \[m / (m/s^2)\].
+    swing_by_friction: f64,
     /// Longest time between two reversals \[s\].
     max_reversal_interval_s: f64,
     /// Square of the radius that weights angles \[m^2\].
     arm_squared: f64,
+    /// Friction that is not stated.
+    pub friction: FrictionEffects,
 }
 
 impl DisturbanceBounds {
-    /// Bounds of a machine. `friction` is the smallest disturbance that exceeds the friction of one drive
-    /// \[m/s^2\]; `arm` is the radius that weights angles \[m\].
-    pub fn new(
-        machine: &Machine,
-        parameters: &Parameters,
-        input_matrix: &InputMatrix,
-        friction: f64,
-        arm: f64,
-    ) -> Self {
+    /// Bounds of a machine. `arm` is the radius that weights angles \[m\].
+    pub fn new(machine: &Machine, parameters: &Parameters, input_matrix: &InputMatrix, arm: f64) -> Self {
         let Parameters { law, payload_change_kg, disturbance_step, .. } = parameters;
         let ReadingErrors { deviation: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
@@ -120,19 +124,27 @@ impl DisturbanceBounds {
         let gravity_over_square = machine.gravity / machine.gravity.norm_squared().max(f64::MIN_POSITIVE);
         let along_gravity =
             Vector6::new(0.0, 0.0, 0.0, gravity_over_square.x, gravity_over_square.y, gravity_over_square.z);
-        let by_legs = leg_wrenches(machine, &machine.home_pose()).tr_mul(&along_gravity).abs().sum();
-        let largest_lift_kg = machine.actuator.max_force * by_legs;
+        let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
+        let by_force = input_matrix.acceleration_by_force(machine, &machine.home_pose());
+        let friction = FrictionEffects {
+            force: machine.actuator.friction_uncertainty,
+            payload: by_force.tr_mul(&payload_by_disturbance).into(),
+            acceleration: core::array::from_fn(|leg| weighted(&by_force.column(leg).into(), arm).norm()),
+            by_force,
+            force_by_disturbance: by_force.try_inverse().unwrap_or_default(),
+        };
+        let sum = |effects: [f64; LEGS]| friction.force * effects.into_iter().map(f64::abs).sum::<f64>();
+        let of_one_leg = friction.force * friction.acceleration.into_iter().fold(f64::INFINITY, f64::min);
         let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass)
-            .max(DEFAULT_PAYLOAD_CHANGE_PER_LIFT * largest_lift_kg);
+            .max(DEFAULT_PAYLOAD_CHANGE_PER_FRICTION * sum(friction.payload));
         let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT
             * parameters.unscaled_limits().position.acceleration)
-            .max(DEFAULT_IMPACT_PER_FRICTION * friction);
+            .max(DEFAULT_IMPACT_PER_FRICTION * of_one_leg);
         let softest = law.position.stiffness.min(law.orientation.stiffness);
         let softness = (SWING_STIFFNESS / softest).max(1.0);
         let swing = (MIN_SWING_PEAK_TO_PEAK_M * softness * softness).min(MAX_SWING_M);
         let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
-        let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
         let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm;
         Self {
             payload_by_disturbance,
@@ -148,10 +160,13 @@ impl DisturbanceBounds {
             } else {
                 f64::INFINITY
             },
-            swing: by_step + swing.max(SWING_DEVIATIONS * noise).max(SWING_BY_FRICTION * friction / softest),
+            swing: by_step
+                + swing.max(SWING_DEVIATIONS * noise).max(SWING_BY_FRICTION * of_one_leg / softest),
             swing_by_acceleration: shaking / softest,
+            swing_by_friction: MAX_SWING_BY_FRICTION / softest,
             max_reversal_interval_s: core::f64::consts::TAU / softest.sqrt(),
             arm_squared: arm * arm,
+            friction,
         }
     }
 
@@ -198,22 +213,25 @@ impl DisturbanceMonitor {
         self.removed_acceleration = self.removed_acceleration.max(bounds.norm_squared(removed).sqrt());
     }
 
-    /// Checks the estimate after a measurement, `dt` seconds after the previous one. `sudden_squared` is the
-    /// square of the disturbance without its mean; 0 if the force of one leg explains it.
+    /// Checks the estimate after a measurement, `dt` seconds after the previous one. `sudden` is the
+    /// disturbance without its mean; 0 if the force of one leg explains it.
     pub fn check(
         &mut self,
         bounds: &DisturbanceBounds,
         estimate: &ErrorEstimate,
         reference: &Motion,
-        sudden_squared: f64,
+        (sudden, friction): (&Vector6<f64>, &UnstatedFriction),
         dt: f64,
     ) -> Result<(), Diagnostic> {
         self.since_start_s += dt;
         self.removed_acceleration *= 1.0 - (dt / CUT_FORCE_DECAY_TIME_CONSTANT_S).min(1.0);
-        let payload = self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, dt);
-        let impact = self.check_impact(bounds, sudden_squared, dt);
-        let oscillation =
-            self.oscillation.check(bounds, &estimate.value, &reference.acceleration.vector(), dt);
+        let by_friction = friction.payload_changes(&bounds.friction);
+        let payload =
+            self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, by_friction, dt);
+        let impact = self.check_impact(bounds, sudden, friction, dt);
+        let by_friction = bounds.swing_by_friction * friction.swing_acceleration(&bounds.friction);
+        let reference = reference.acceleration.vector();
+        let oscillation = self.oscillation.check(bounds, &estimate.value, &reference, by_friction, dt);
         // Control begins with an unknown payload, and the error rings.
         let oscillation = if self.since_start_s < START_S { Ok(()) } else { oscillation };
         oscillation?;
@@ -226,6 +244,7 @@ impl DisturbanceMonitor {
         bounds: &DisturbanceBounds,
         disturbance: &Vector6<f64>,
         acceleration: &Acceleration,
+        [least_by_friction, most_by_friction]: [f64; 2],
         dt: f64,
     ) -> Result<(), Diagnostic> {
         let weight_ratio =
@@ -234,9 +253,10 @@ impl DisturbanceMonitor {
         self.payload += (payload - self.payload) * (dt / PAYLOAD_TIME_CONSTANT_S).min(1.0);
         let change = self.payload - self.usual_payload;
         let is_starting = self.since_start_s < START_S;
-        let share = if is_starting { 1.0 } else { (dt / USUAL_PAYLOAD_TIME_CONSTANT_S).min(1.0) };
+        let share = if is_starting { 1.0 } else { (dt / USUAL_PAYLOAD_S).min(1.0) };
         self.usual_payload += change * share;
         let bound = bounds.max_payload_change_kg + bounds.payload_by_norm * self.removed_acceleration;
+        let bound = bound + if change > 0.0 { most_by_friction } else { -least_by_friction };
         if is_starting || change.abs() <= bound {
             return Ok(());
         }
@@ -246,11 +266,13 @@ impl DisturbanceMonitor {
     fn check_impact(
         &mut self,
         bounds: &DisturbanceBounds,
-        sudden_squared: f64,
+        sudden: &Vector6<f64>,
+        friction: &UnstatedFriction,
         dt: f64,
     ) -> Result<(), Diagnostic> {
         let bound = bounds.max_sudden_disturbance + self.removed_acceleration;
-        if sudden_squared <= bound * bound {
+        let is_within = |sudden: &Vector6<f64>| bounds.norm_squared(sudden) <= bound * bound;
+        if is_within(sudden) || is_within(&friction.unexplained(&bounds.friction, sudden)) {
             self.impact_s = 0.0;
             return Ok(());
         }
@@ -258,7 +280,7 @@ impl DisturbanceMonitor {
         if self.impact_s > MAX_IMPACT_S {
             return Err(Diagnostic::new(DiagnosticCode::DisturbanceLasting, self.impact_s, MAX_IMPACT_S));
         }
-        Err(Diagnostic::new(DiagnosticCode::Impact, sudden_squared.sqrt(), bound))
+        Err(Diagnostic::new(DiagnosticCode::Impact, bounds.norm_squared(sudden).sqrt(), bound))
     }
 }
 
@@ -268,6 +290,7 @@ impl Oscillation {
         bounds: &DisturbanceBounds,
         error: &Vector6<f64>,
         acceleration: &Vector6<f64>,
+        by_friction: f64,
         dt: f64,
     ) -> Result<(), Diagnostic> {
         let share = (dt * core::f64::consts::PI / bounds.max_reversal_interval_s).min(1.0);
@@ -280,7 +303,7 @@ impl Oscillation {
         if bounds.norm_squared(&back) > bounds.swing * bounds.swing
             && back.dot(&(self.farthest - self.error_at_reversal)) <= 0.0
         {
-            return self.count(bounds, error, bounds.norm_squared(&back));
+            return self.count(bounds, error, bounds.norm_squared(&back), by_friction);
         }
         let swing_squared = bounds.norm_squared(&(error - self.error_at_reversal));
         if swing_squared >= self.swing_squared {
@@ -301,7 +324,7 @@ impl Oscillation {
         (self.since_turn_s, self.swings, self.last_swing_squared) = (0.0, 0, 0.0);
     }
 
-    /// Counts a reversal, unless the motion of the reference explains it.
+    /// Counts a reversal, unless the motion of the reference or friction explains it.
     #[cold]
     #[inline]
     fn count(
@@ -309,8 +332,10 @@ impl Oscillation {
         bounds: &DisturbanceBounds,
         error: &Vector6<f64>,
         back_squared: f64,
+        by_friction: f64,
     ) -> Result<(), Diagnostic> {
-        let bound = bounds.swing + bounds.swing_by_acceleration * self.shaking_squared.sqrt();
+        let by_shaking = bounds.swing_by_acceleration * self.shaking_squared.sqrt();
+        let bound = bounds.swing + by_shaking + by_friction;
         if back_squared <= bound * bound {
             return Ok(());
         }

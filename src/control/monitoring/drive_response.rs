@@ -21,13 +21,12 @@ use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
+use crate::control::monitoring::disturbance_monitor::USUAL_DISTURBANCE_S;
 use crate::control::monitoring::weighting::{MIN_MISSING_PER_MAX_FORCE, weighted};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
 use crate::model::rigid::Pose;
 
-/// Time constant of the usual disturbance \[s\]: several times the estimator's.
-const USUAL_TIME_CONSTANT_S: f64 = 0.15;
 /// Time from the start of control in which any disturbance is usual \[s\], because the payload is still
 /// unknown.
 const START_S: f64 = 0.25;
@@ -49,8 +48,8 @@ pub(in crate::control) struct DriveResponse {
     usual_force: Vector6<f64>,
     since_start_s: f64,
     missing_s: f64,
-    /// Square of the weighted change of the disturbance; 0 if the force of one leg explains it.
-    pub sudden_disturbance_squared: f64,
+    /// Change of the disturbance; 0 if the force of one leg explains it.
+    pub sudden_disturbance: Vector6<f64>,
 }
 
 impl DriveResponse {
@@ -66,14 +65,14 @@ impl DriveResponse {
         let sudden = disturbance - self.usual_disturbance;
         self.since_start_s += dt;
         let is_starting = self.since_start_s < START_S;
-        let share = if is_starting { 1.0 } else { (dt / USUAL_TIME_CONSTANT_S).min(1.0) };
+        let share = if is_starting { 1.0 } else { (dt / USUAL_DISTURBANCE_S).min(1.0) };
         self.usual_disturbance += sudden * share;
         let sent = Vector6::from(*sent);
         self.usual_force += (sent - self.usual_force) * share;
         let arm = constants.angle_weighting_radius_m();
+        self.sudden_disturbance = if is_starting { Vector6::zeros() } else { sudden };
         let sudden = weighted(&sudden, arm);
-        self.sudden_disturbance_squared = if is_starting { 0.0 } else { sudden.norm_squared() };
-        if is_starting || self.sudden_disturbance_squared < constants.least_missing_acceleration_squared {
+        if is_starting || sudden.norm_squared() < constants.least_missing_acceleration_squared {
             self.missing_s = 0.0;
             return Ok(());
         }
@@ -106,7 +105,7 @@ impl DriveResponse {
             let force = along / square * if *sent < 0.0 { -1.0 } else { 1.0 };
             let explains = along * along >= least * square;
             if explains {
-                self.sudden_disturbance_squared = 0.0;
+                self.sudden_disturbance = Vector6::zeros();
             }
             let bound =
                 (MIN_MISSING_PER_USUAL_FORCE * usual.abs()).max(MIN_MISSING_PER_MAX_FORCE * max_force);

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
+use crate::model::machine::Actuator;
 
 /// Equal readings in a row from which a sensor may be frozen. Coarse steps repeat fewer by chance.
 const MIN_EQUAL_READINGS: u32 = 3;
@@ -30,6 +31,9 @@ const MAX_ONE_LEG_BOUND_M: f64 = 1.5e-4;
 /// 0.5 % friction, and stiction of 0.05 %. While a platform crawls, feedback pushes a leg with a frozen
 /// sensor harder than this long before the reference has moved by the bounds above.
 const STICTION_RATIO: f64 = 0.002;
+/// Change of the force on a leg that stands, relative to its unstated friction: from one direction to the other,
+/// with reserve.
+const FRICTION_REVERSAL: f64 = 3.0;
 /// Time of equal readings from which a larger force is a fault \[s\]. A leg that is not frozen leaves its
 /// step sooner.
 const LONG_S: f64 = 0.05;
@@ -41,6 +45,8 @@ const LEAST_MOTION_STEPS: f64 = 10.0;
 /// the configured one.
 const MAX_EQUAL_AT_ONE_STEP: f64 = 100.0;
 const MAX_EQUAL_NOISY_READINGS: f64 = 12.0;
+/// Largest step of a sensor whose step is not stated \[m\].
+const MAX_UNSTATED_STEP_M: f64 = 2e-5;
 /// Bound on the motion in steps of a coarse sensor. In the same ten hours, with payload and friction known to
 /// 20 %, the largest motion was 15.2 steps.
 const MIN_BOUND_SENSOR_STEPS: f64 = 17.0;
@@ -63,16 +69,20 @@ pub struct FrozenLegBounds {
     /// Change of the feedback force on the leg \[N\], for a long run of equal readings while the reference
     /// has moved. Stiction may balance a smaller change.
     pub force: f64,
+    /// Change of the force on a leg that unstated friction may balance while the leg stands \[N\].
+    pub friction: f64,
     /// Number of readings that make a run long.
     pub long: u32,
 }
 
 impl FrozenLegBounds {
     /// Bounds of a loop with the stiffness Kp \[1/s^2\].
-    pub fn new(stiffness: f64, max_force: f64, period_s: f64) -> Self {
+    pub fn new(stiffness: f64, actuator: &Actuator, period_s: f64) -> Self {
+        let friction = FRICTION_REVERSAL * actuator.friction_uncertainty;
         Self {
             motion: motion_bound(stiffness),
-            force: STICTION_RATIO * max_force,
+            force: friction.max(STICTION_RATIO * actuator.max_force),
+            friction,
             long: (LONG_S / period_s) as u32,
         }
     }
@@ -88,14 +98,28 @@ fn motion_bound(stiffness: f64) -> f64 {
 }
 
 /// Runs of equal readings, and the reference at the first reading of each run.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct FrozenSensors {
     last: [f64; LEGS],
     equal_readings: [u32; LEGS],
+    /// Smallest change of a reading: a step of the sensor, or less \[m\].
+    least_change: [f64; LEGS],
     /// Reference lengths at the first of the equal readings \[m\].
     reference: [f64; LEGS],
     /// Feedback forces on the legs at the first of the equal readings \[N\].
     feedback: [f64; LEGS],
+}
+
+impl Default for FrozenSensors {
+    fn default() -> Self {
+        Self {
+            last: [0.0; LEGS],
+            equal_readings: [0; LEGS],
+            least_change: [MAX_UNSTATED_STEP_M; LEGS],
+            reference: [0.0; LEGS],
+            feedback: [0.0; LEGS],
+        }
+    }
 }
 
 impl FrozenSensors {
@@ -109,14 +133,23 @@ impl FrozenSensors {
         legs: impl FnOnce() -> [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
         let mut is_any_equal = false;
-        for ((last, equal), length) in self.last.iter_mut().zip(&mut self.equal_readings).zip(length) {
+        let memory = self.last.iter_mut().zip(&mut self.equal_readings).zip(&mut self.least_change);
+        for (((last, equal), least_change), length) in memory.zip(length) {
             // To the last bit, because a frozen sensor repeats its reading exactly.
             let is_equal = last.to_bits() == length.to_bits();
             *equal = if is_equal { equal.saturating_add(1) } else { 0 };
+            if !is_equal {
+                *least_change = least_change.min((length - *last).abs());
+            }
             *last = *length;
             is_any_equal |= is_equal;
         }
         if is_any_equal { self.check_motion(&legs(), errors, one_leg) } else { Ok(()) }
+    }
+
+    /// Largest step that the sensors may have, by their readings.
+    fn largest_step(&self) -> f64 {
+        self.least_change.iter().copied().fold(0.0, f64::max)
     }
 
     /// Whether any sensor has repeated its reading often enough to be frozen.
@@ -135,8 +168,9 @@ impl FrozenSensors {
     ) -> Result<(), Diagnostic> {
         let are_all_equal = self.equal_readings.iter().all(|equal| *equal + 1 >= MIN_EQUAL_READINGS);
         let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion };
-        let bound = (bound + errors.resolution).max(MIN_BOUND_SENSOR_STEPS * errors.resolution);
-        let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * errors.resolution);
+        let resolution = if errors.resolution > 0.0 { errors.resolution } else { self.largest_step() };
+        let bound = (bound + resolution).max(MIN_BOUND_SENSOR_STEPS * resolution);
+        let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * resolution);
         let mut result = Ok(());
         let first = self.reference.iter_mut().zip(&mut self.feedback);
         let legs = first.zip(&self.equal_readings).zip(reference.iter().zip(feedback_force));
@@ -145,11 +179,13 @@ impl FrozenSensors {
                 (*first, *first_force) = (*reference, *force);
             }
             let moved = (reference - *first).abs();
-            if *equal + 1 >= MIN_EQUAL_READINGS && moved > bound && result.is_ok() {
+            let force = (force - *first_force).abs();
+            let is_far = *equal + 1 >= MIN_EQUAL_READINGS && moved > bound;
+            if is_far && force >= one_leg.friction && result.is_ok() {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, bound).at(leg));
             }
             let is_long = *equal >= one_leg.long && moved > least_motion;
-            if is_long && (force - *first_force).abs() > one_leg.force && result.is_ok() {
+            if is_long && force > one_leg.force && result.is_ok() {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, least_motion).at(leg));
             }
             let repeats = |most| f64::from(*equal + 1) > most;
@@ -165,7 +201,8 @@ impl FrozenSensors {
 mod tests {
     use super::*;
 
-    const BOUNDS: FrozenLegBounds = FrozenLegBounds { motion: ONE_LEG_BOUND_M, force: 10.0, long: 50 };
+    const BOUNDS: FrozenLegBounds =
+        FrozenLegBounds { motion: ONE_LEG_BOUND_M, force: 10.0, friction: 0.0, long: 50 };
 
     /// Readings of a crawling leg that does not move while the feedback force on it grows to `newtons`.
     fn is_frozen_at(newtons: f64, readings: u32) -> bool {

@@ -75,6 +75,7 @@ pub(in crate::control) fn machine(samples: &mut RandomVectors) -> Machine {
             reflected_mass: 0.0,
             viscous_friction: 0.0,
             coulomb_friction: 0.0,
+            friction_uncertainty: 0.0,
             coulomb_smoothing: Actuator::COULOMB_SMOOTHING_M_S,
         },
         home: [0.0, 0.0, 0.0, 0.0, 0.0, 1.5],

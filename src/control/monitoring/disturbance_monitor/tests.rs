@@ -3,8 +3,19 @@
 
 use core::f64::consts::TAU;
 
+use nalgebra::Matrix6;
+
 use crate::control::monitoring::disturbance_monitor::*;
 use crate::model::task::TaskState;
+
+const ZERO: Matrix6<f64> = Matrix6::from_array_storage(nalgebra::ArrayStorage([[0.0; 6]; 6]));
+const NO_FRICTION: FrictionEffects = FrictionEffects {
+    force: 0.0,
+    payload: [0.0; 6],
+    acceleration: [0.0; 6],
+    by_force: ZERO,
+    force_by_disturbance: ZERO,
+};
 
 const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     payload_by_disturbance: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.2),
@@ -14,9 +25,15 @@ const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     max_sudden_disturbance: 2.0,
     swing: MIN_SWING_PEAK_TO_PEAK_M,
     swing_by_acceleration: 1.0 / SWING_STIFFNESS,
+    swing_by_friction: 1.0 / SWING_STIFFNESS,
     max_reversal_interval_s: 0.1,
     arm_squared: 1.0,
+    friction: NO_FRICTION,
 };
+
+fn along_z(value: f64) -> Vector6<f64> {
+    Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value)
+}
 
 /// First diagnostic and its time. `at` gives the estimate, the reference acceleration and the sudden
 /// disturbance.
@@ -26,13 +43,18 @@ fn found(at: impl Fn(f64) -> (ErrorEstimate, f64, f64)) -> Option<(DiagnosticCod
         let (estimate, acceleration, sudden) = at(t);
         let mut reference = TaskState::at_rest([0.0; 6]).motion();
         reference.acceleration.linear.z = acceleration;
-        let result = monitor.check(&BOUNDS, &estimate, &reference, sudden * sudden, 1e-3);
+        let result = monitor.check(
+            &BOUNDS,
+            &estimate,
+            &reference,
+            (&along_z(sudden), &UnstatedFriction::default()),
+            1e-3,
+        );
         result.err().map(|diagnostic| (diagnostic.code, t))
     })
 }
 
 fn with(error: f64, disturbance: f64) -> ErrorEstimate {
-    let along_z = |value: f64| Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value);
     ErrorEstimate { value: along_z(error), rate: Vector6::zeros(), disturbance: along_z(disturbance) }
 }
 
@@ -95,7 +117,12 @@ fn an_impact_is_brief() {
     assert_eq!(pushed(1.9), None);
     assert_eq!(pushed(2.1), Some((DiagnosticCode::Impact, 1.0)));
     let mut monitor = DisturbanceMonitor::default();
-    let lasting = |_| monitor.check_impact(&BOUNDS, 4.1, 1e-3).err().map(|found| found.code);
+    let lasting = |_| {
+        monitor
+            .check_impact(&BOUNDS, &along_z(4.1f64.sqrt()), &UnstatedFriction::default(), 1e-3)
+            .err()
+            .map(|found| found.code)
+    };
     let codes: [_; 25] = core::array::from_fn(lasting);
     assert_eq!(codes[15], Some(DiagnosticCode::Impact));
     assert_eq!(codes[24], Some(DiagnosticCode::DisturbanceLasting));
@@ -103,18 +130,22 @@ fn an_impact_is_brief() {
 
 #[test]
 fn what_limits_took_away_is_no_change() {
-    let along_z = |value: f64| FeedbackAcceleration(Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value));
     let changed = |limited: f64, disturbance: f64| {
         let mut monitor = DisturbanceMonitor::default();
         (0..2000).find_map(|cycle| {
             let is_cut = cycle >= 1500;
             if is_cut {
-                monitor.record_removed_acceleration(&BOUNDS, &along_z(limited));
+                monitor.record_removed_acceleration(&BOUNDS, &FeedbackAcceleration(along_z(limited)));
             }
             let disturbance = if is_cut { disturbance } else { 0.0 };
             let reference = TaskState::at_rest([0.0; 6]).motion();
-            let found =
-                monitor.check(&BOUNDS, &with(0.0, disturbance), &reference, disturbance * disturbance, 1e-3);
+            let found = monitor.check(
+                &BOUNDS,
+                &with(0.0, disturbance),
+                &reference,
+                (&along_z(disturbance), &UnstatedFriction::default()),
+                1e-3,
+            );
             found.err().map(|found| found.code)
         })
     };
@@ -124,9 +155,20 @@ fn what_limits_took_away_is_no_change() {
     assert_eq!(changed(2.0, 4.1), Some(DiagnosticCode::Impact));
     // Forgotten after some seconds.
     let mut monitor = DisturbanceMonitor::default();
-    monitor.record_removed_acceleration(&BOUNDS, &along_z(1e3));
+    monitor.record_removed_acceleration(&BOUNDS, &FeedbackAcceleration(along_z(1e3)));
     assert_eq!(monitor.removed_acceleration, 1e3);
     let rest = TaskState::at_rest([0.0; 6]).motion();
-    (0..12_000).for_each(|_| assert_eq!(monitor.check(&BOUNDS, &with(0.0, 0.0), &rest, 0.0, 1e-3), Ok(())));
+    (0..12_000).for_each(|_| {
+        assert_eq!(
+            monitor.check(
+                &BOUNDS,
+                &with(0.0, 0.0),
+                &rest,
+                (&Vector6::zeros(), &UnstatedFriction::default()),
+                1e-3
+            ),
+            Ok(())
+        )
+    });
     assert!(monitor.removed_acceleration < 0.01, "{}", monitor.removed_acceleration);
 }

@@ -1,0 +1,157 @@
+//! Friction that the machine file does not state: how much of a disturbance it may explain.
+//!
+//! Each leg may have dry friction of up to Fu, `actuator.friction_uncertainty_n`, beyond the model. While a leg
+//! moves one way, this friction is constant and part of the usual disturbance. When the leg begins to move,
+//! stops or turns around, its friction changes by up to 2 Fu, against the new direction. With b_i the
+//! acceleration by a unit force of leg i and T the time constant of what is usual:
+//!
+//! ```text
+//! change of a disturbance by friction = sum of b_i f_i      |f_i| <= 2 Fu exp(-t_i / T),  t_i since leg i turned
+//! ```
+//!
+//! The checks of payload, impact and swings permit such changes. A leg that sticks while the reference moves
+//! takes a change of force of 2 Fu, see [`frozen_sensors`](super::frozen_sensors).
+
+use nalgebra::{Matrix6, Vector6};
+use serde::{Deserialize, Serialize};
+
+use crate::control::monitoring::disturbance_monitor::{USUAL_DISTURBANCE_S, USUAL_PAYLOAD_S};
+use crate::model::LEGS;
+
+/// Rate below which a leg may stick, and below which it stands \[m/s\].
+const STICKING_M_S: f64 = 1e-4;
+const STANDING_M_S: f64 = 1e-6;
+
+/// Friction of a machine and its effects.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrictionEffects {
+    /// Fu \[N\].
+    pub force: f64,
+    /// Change of payload by a force of each leg \[kg/N\].
+    pub payload: [f64; LEGS],
+    /// Largest acceleration that swings the platform by a force of one leg, its angles weighted \[m/s^2/N\].
+    pub acceleration: [f64; LEGS],
+    /// b_i, in error coordinates, and the inverse.
+    pub by_force: Matrix6<f64>,
+    /// Forces of the legs that explain a disturbance.
+    pub force_by_disturbance: Matrix6<f64>,
+}
+
+/// Directions of the legs, and shares of the largest friction that its changes may still have.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(in crate::control) struct UnstatedFriction {
+    /// 1, -1, or 0 for a leg that may stick.
+    direction: [i8; LEGS],
+    /// Of what is sudden, and of what is not usual.
+    sudden: [f64; LEGS],
+    unusual: [f64; LEGS],
+}
+
+impl UnstatedFriction {
+    /// Follows the rates of the reference's legs, `dt` seconds after the last.
+    pub fn update(&mut self, rates: &[f64; LEGS], dt: f64) {
+        let is_standing = rates.iter().all(|rate| rate.abs() < STANDING_M_S);
+        let legs = self.direction.iter_mut().zip(rates);
+        for ((direction, rate), (sudden, unusual)) in legs.zip(self.sudden.iter_mut().zip(&mut self.unusual))
+        {
+            let now = if rate.abs() < STICKING_M_S { 0 } else { rate.signum() as i8 };
+            *sudden *= 1.0 - (dt / USUAL_DISTURBANCE_S).min(1.0);
+            *unusual *= 1.0 - (dt / USUAL_PAYLOAD_S).min(1.0);
+            if now != *direction || now == 0 && !is_standing {
+                (*direction, *sudden, *unusual) = (now, 2.0, 2.0);
+            }
+        }
+    }
+
+    /// Least and largest force on each leg by which friction may recently have changed \[N\].
+    fn forces(&self, friction: f64, shares: &[f64; LEGS]) -> [[f64; 2]; LEGS] {
+        let mut forces = [[0.0; 2]; LEGS];
+        for ((range, share), direction) in forces.iter_mut().zip(shares).zip(&self.direction) {
+            let most = friction * share;
+            *range = [if *direction < 0 { 0.0 } else { -most }, if *direction > 0 { 0.0 } else { most }];
+        }
+        forces
+    }
+
+    /// Least and largest change of payload that friction may explain \[kg\].
+    pub fn payload_changes(&self, effects: &FrictionEffects) -> [f64; 2] {
+        let forces = self.forces(effects.force, &self.unusual);
+        forces.iter().zip(&effects.payload).fold([0.0; 2], |[least, most], ([low, high], effect)| {
+            let (low, high) = (low * effect, high * effect);
+            [least + low.min(high), most + low.max(high)]
+        })
+    }
+
+    /// Part of a sudden disturbance that friction does not explain.
+    // Out of line because it is rare: the code of the cycle stays short.
+    #[inline(never)]
+    pub fn unexplained(&self, effects: &FrictionEffects, sudden: &Vector6<f64>) -> Vector6<f64> {
+        let mut rest = effects.force_by_disturbance * sudden;
+        for (force, [low, high]) in rest.iter_mut().zip(self.forces(effects.force, &self.sudden)) {
+            *force -= force.clamp(low, high);
+        }
+        effects.by_force * rest
+    }
+
+    /// Acceleration with which friction may swing the platform \[m/s^2\].
+    pub fn swing_acceleration(&self, effects: &FrictionEffects) -> f64 {
+        let legs = self.unusual.iter().zip(&effects.acceleration);
+        effects.force * legs.map(|(share, effect)| share * effect).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EFFECTS: FrictionEffects = FrictionEffects {
+        force: 10.0,
+        payload: [0.1; LEGS],
+        acceleration: [0.2; LEGS],
+        by_force: Matrix6::new(
+            1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
+            0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0,
+        ),
+        force_by_disturbance: Matrix6::new(
+            1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
+            0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0,
+        ),
+    };
+
+    #[test]
+    fn friction_explains_a_change_only_for_a_while_after_a_leg_turned_and_only_against_its_motion() {
+        let mut friction = UnstatedFriction::default();
+        let mut play = |rate: f64, seconds: f64| {
+            let rates = [rate, 0.01, 0.01, 0.01, 0.01, 0.01];
+            (0..(1e3 * seconds) as u32).for_each(|_| friction.update(&rates, 1e-3));
+            friction
+        };
+        let is_near = |found: f64, expected: f64| (found - expected).abs() < 0.01;
+        let [least, most] = play(0.01, 0.001).payload_changes(&EFFECTS);
+        assert!(is_near(least, -12.0) && most == 0.0, "all legs begin to move: {least} {most}");
+        let [least, _] = play(0.01, 10.0).payload_changes(&EFFECTS);
+        assert!(least > -1e-2, "all move one way");
+        let turned = play(-0.01, 0.001);
+        let [_, most] = turned.payload_changes(&EFFECTS);
+        assert!(is_near(most, 2.0), "one turns around: {most}");
+        let unexplained = |x: f64, y: f64| {
+            let rest = turned.unexplained(&EFFECTS, &Vector6::new(x, y, 0.0, 0.0, 0.0, 0.0));
+            [rest.x, rest.y]
+        };
+        assert_eq!([unexplained(19.0, 0.0), unexplained(-19.0, 0.0)], [[0.0, 0.0], [-19.0, 0.0]]);
+        let [x, y] = unexplained(25.0, 3.0);
+        assert!(is_near(x, 5.0) && is_near(y, 3.0), "{x} {y}");
+        let [least, most] = play(-5e-5, 5.0).payload_changes(&EFFECTS);
+        assert!(is_near(least, -2.0) && is_near(most, 2.0), "it may stick while others move: {least} {most}");
+    }
+
+    #[test]
+    fn a_platform_at_rest_has_no_friction_that_changes() {
+        let mut friction = UnstatedFriction::default();
+        (0..10_000).for_each(|_| friction.update(&[1e-9; LEGS], 1e-3));
+        assert_eq!(friction.payload_changes(&EFFECTS), [0.0; 2]);
+        assert_eq!(friction.swing_acceleration(&EFFECTS), 0.0);
+        let sudden = Vector6::repeat(1.0);
+        assert_eq!(friction.unexplained(&EFFECTS, &sudden), sudden);
+    }
+}

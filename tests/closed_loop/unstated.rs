@@ -1,0 +1,91 @@
+//! What the machine file does not state, on a built-in motion: friction with stiction, delay of the drives, steps of the sensors. None of
+//! it is a fault.
+
+use hexad::commands::r#move::trajectory::Trajectory;
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
+use hexad::model::random::Random;
+use hexad::motion::built_in::BuiltInMotion;
+use hexad::plant::imperfections::{DriveErrors, Friction, Imperfections, SensorErrors};
+use rayon::prelude::*;
+
+use super::common::certificate::Certificate;
+use super::common::hardware_loop::{HardwareLoop, configured};
+
+const MACHINES: [&str; 4] = ["motion_base", "fried2008", "tsai2000", "reference"];
+const MOTIONS: [BuiltInMotion; 5] = [
+    BuiltInMotion::Settle,
+    BuiltInMotion::MinimumJerk,
+    BuiltInMotion::Sines,
+    BuiltInMotion::Circle,
+    BuiltInMotion::Paper,
+];
+/// Time to engage and to estimate the disturbance \[s\].
+const SETTLED_S: f64 = 2.0;
+/// Duration of the motion, as in `hexad demo` \[s\].
+const MOTION_S: f64 = 8.0;
+const EPISODES: u64 = 160;
+const LONG_EPISODES: u64 = 400;
+
+/// One world by chance; why control ended.
+fn episode(seed: u64) -> Result<(), String> {
+    let machine = MACHINES[seed as usize % MACHINES.len()];
+    let motion = MOTIONS[seed as usize / MACHINES.len() % MOTIONS.len()];
+    let mut random = Random::new(seed);
+    let mut between = |least: f64, most: f64| least + (most - least) * random.uniform();
+    let config = configured(machine, "");
+    let dry = between(0.0, 1.0) * config.machine.actuator.friction_uncertainty;
+    let stiction = between(0.0, 0.5);
+    let (delay_us, step) = (between(0.0, 3000.0).round(), 10.0_f64.powf(between(-8.0, -4.7)));
+    let imperfections = Imperfections {
+        seed,
+        drive: DriveErrors { dead_time_ns: (1e3 * delay_us) as u64, ..DriveErrors::default() },
+        friction: Friction {
+            coulomb: (1.0 - stiction) * dry,
+            stiction: stiction * dry,
+            stribeck_speed: 10.0_f64.powf(between(-3.3, -2.0)),
+            ..Friction::default()
+        },
+        sensor: SensorErrors {
+            length_step: step,
+            length_noise: 10.0_f64.powf(between(-8.0, -6.0)),
+            ..SensorErrors::default()
+        },
+        ..Imperfections::default()
+    };
+    let Ok(Trajectory::BuiltIn(scene)) = Trajectory::built_in(&config, motion, MOTION_S) else {
+        return Err(format!("{machine} {motion:?}: no motion"));
+    };
+    let mut control = HardwareLoop::new(&config, &config.machine, &imperfections);
+    while control.time_s() < SETTLED_S + MOTION_S {
+        let input = control.input(&scene.at((control.time_s() - SETTLED_S).max(0.0)));
+        let Output { state, diagnostic, .. } = control.cycle(&input);
+        let is_settled = control.time_s() > SETTLED_S;
+        if is_settled && (state, diagnostic.code) != (State::Active, DiagnosticCode::None) {
+            return Err(format!(
+                "{machine} {motion:?}, seed {seed}, after {:.3} s: {state:?}, {:?} {:.6} of {:.6}; {dry:.1} N of dry friction, {:.2} of it \
+                 stiction, delay {delay_us} us, step {step:.1e} m",
+                control.time_s(),
+                diagnostic.code,
+                diagnostic.value,
+                diagnostic.bound,
+                stiction
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn certificate_what_is_not_stated_gives_no_alarm() {
+    let certificate = Certificate::new("unstated", EPISODES, LONG_EPISODES);
+    let run = |seed| {
+        let ended = episode(seed);
+        certificate.advance(1);
+        ended.err()
+    };
+    let alarms: Vec<_> = (0..certificate.total()).into_par_iter().filter_map(run).collect();
+    certificate.finish(format_args!("{} alarms", alarms.len()));
+    assert!(alarms.is_empty(), "{} alarms:\n{}", alarms.len(), alarms.join("\n"));
+}
