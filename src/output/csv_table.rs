@@ -111,6 +111,11 @@ impl NumberTable {
         &self.rows
     }
 
+    /// The rows, to change their numbers.
+    pub fn rows_mut(&mut self) -> &mut [Vec<f64>] {
+        &mut self.rows
+    }
+
     /// The line of the file that each of the rows begins in.
     pub fn lines(&self) -> &[u64] {
         &self.lines
