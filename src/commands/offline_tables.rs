@@ -137,10 +137,9 @@ mod tests {
             let [alpha, beta, gamma] = triple(start.map(|angle| angle + 0.2 * rise(t, 2.0).value));
             text += &format!("{t},{alpha:?},{beta:?},{gamma:?},0,0,0.65\n");
         }
-        let path = Path::new("x.csv");
-        let mut table = NumberTable::from_reader(text.as_bytes(), path, &pose_columns(), &[]).unwrap();
-        continue_angles(&mut table, &[start[0], start[1], start[2], 0.0, 0.0, 0.65]);
-        with_derivatives(table, path).unwrap()
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(&file, text).unwrap();
+        read_trajectory(file.path(), &[start[0], start[1], start[2], 0.0, 0.0, 0.65]).unwrap()
     }
 
     /// As in a live stream, where poses are compared: another triple of the same orientation changes no motion.
