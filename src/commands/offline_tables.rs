@@ -56,14 +56,31 @@ impl UnsolvedRows {
 const MIN_STEP_S: f64 = 1e-6;
 
 /// Reads a table of t, X, X', X''. If X' and X'' are missing, they are computed from the spline through the
-/// poses.
-pub fn read_trajectory(path: &Path) -> Result<NumberTable, TableError> {
-    let table = NumberTable::read(path, &pose_columns(), &derivative_columns())?;
+/// poses. Each row has the triple of Bryan angles nearest to that of the row before, the first nearest to `home`.
+pub fn read_trajectory(path: &Path, home: &[f64; 6]) -> Result<NumberTable, TableError> {
+    let mut table = NumberTable::read(path, &pose_columns(), &derivative_columns())?;
+    continue_angles(&mut table, home);
     with_derivatives(table, name_of(path))
 }
 
+/// Chooses the triples of angles that continue each other: an angle that passes 180 deg does not jump.
+fn continue_angles(table: &mut NumberTable, home: &[f64; 6]) {
+    let mut near = *home;
+    for row in table.rows_mut() {
+        let state = task_state(row).nearest_to(&near);
+        near = state.x.into();
+        let nearest = numbers(Knot { t: time(row), state });
+        row.iter_mut().zip(nearest).for_each(|(number, nearest)| *number = nearest);
+    }
+}
+
+/// The numbers of a row of a trajectory.
+fn numbers(Knot { t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
+    [t].into_iter().chain([x, xd, xdd].into_iter().flat_map(<[f64; 6]>::from))
+}
+
 /// Adds X' and X'' to a table that has only poses.
-pub fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, TableError> {
+fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, TableError> {
     let width = trajectory_columns().len();
     if table.rows().iter().all(|row| row.len() == width) {
         return Ok(table);
@@ -81,10 +98,7 @@ pub fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, 
         errors.add("X' and X'' cannot be computed: the steps of t must be less unequal".into());
         errors.into_result()?;
     }
-    let numbers = |Knot { t, state: TaskState { x, xd, xdd } }: &Knot| {
-        [*t].into_iter().chain([x, xd, xdd].into_iter().flatten().copied()).collect()
-    };
-    let rows = knots.iter().map(numbers).collect();
+    let rows = knots.into_iter().map(|knot| numbers(knot).collect()).collect();
     Ok(table.with_rows(rows))
 }
 
@@ -108,4 +122,40 @@ pub fn time(row: &[f64]) -> f64 {
 /// X, X', X'' of a row of a trajectory.
 pub fn task_state(row: &[f64]) -> TaskState {
     TaskState { x: six(row, 1).into(), xd: six(row, 7).into(), xdd: six(row, 13).into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::minimum_jerk::rise;
+    use core::f64::consts::{FRAC_PI_2, PI};
+
+    /// Table of a motion that begins at the angles `start`, each row with its own triple of angles.
+    fn read(start: [f64; 3], triple: fn([f64; 3]) -> [f64; 3]) -> NumberTable {
+        let mut text = pose_columns().join(",") + "\n";
+        for t in (0..=40).map(|k| 0.05 * f64::from(k)) {
+            let [alpha, beta, gamma] = triple(start.map(|angle| angle + 0.2 * rise(t, 2.0).value));
+            text += &format!("{t},{alpha:?},{beta:?},{gamma:?},0,0,0.65\n");
+        }
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(&file, text).unwrap();
+        read_trajectory(file.path(), &[start[0], start[1], start[2], 0.0, 0.0, 0.65]).unwrap()
+    }
+
+    /// As in a live stream, where poses are compared: another triple of the same orientation changes no motion.
+    #[test]
+    fn angles_that_pass_180_deg_continue() {
+        let wrapped = |angles: [f64; 3]| angles.map(|angle| angle - (angle / (2.0 * PI)).round() * 2.0 * PI);
+        let upright = |[alpha, beta, gamma]: [f64; 3]| {
+            if beta > FRAC_PI_2 { [alpha + PI, PI - beta, gamma + PI] } else { [alpha, beta, gamma] }
+        };
+        for start in [[0.0, 0.1, PI - 0.1], [PI, -0.1, -PI], [0.3, FRAC_PI_2 - 0.13, 0.2]] {
+            let continued = read(start, |angles| angles);
+            for table in [read(start, wrapped), read(start, upright)] {
+                for (a, b) in table.rows().iter().flatten().zip(continued.rows().iter().flatten()) {
+                    assert!((a - b).abs() < 1e-9, "{start:?}: {a}, not {b}");
+                }
+            }
+        }
+    }
 }

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 
+/// Cosine of beta up to which only the sum or the difference of alpha and gamma is determined.
+const MIN_COS_BETA: f64 = 1e-12;
+
 /// Motion in task coordinates at one instant: Bryan angles \[rad\], position \[m\], and their time derivatives.
 ///
 /// X' and X'' hold angle rates, not angular velocity:
@@ -79,6 +82,22 @@ impl TaskState {
         }
     }
 
+    /// The same motion with the triple of Bryan angles nearest to `near`, as of [`task_coordinates`]. Where only the sum or the
+    /// difference of alpha and gamma is determined, a state in motion keeps its own.
+    pub fn nearest_to(&self, near: &[f64; 6]) -> Self {
+        let [alpha, beta, gamma, ..]: [f64; 6] = self.x.into();
+        if libm::cos(beta).abs() <= MIN_COS_BETA && *self == Self::at_rest(self.x.into()) {
+            return Self::at_rest(task_coordinates(&self.motion().pose, near));
+        }
+        let mut nearest = *self;
+        let ([alpha, beta, gamma], is_mirrored) = nearest_angles([alpha, beta, gamma], near);
+        (nearest.x.x, nearest.x.y, nearest.x.z) = (alpha, beta, gamma);
+        if is_mirrored {
+            (nearest.xd.y, nearest.xdd.y) = (-self.xd.y, -self.xdd.y);
+        }
+        nearest
+    }
+
     /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         // Zero times infinity or NaN is NaN: one comparison instead of a branch per number.
@@ -100,16 +119,24 @@ impl TaskState {
 /// difference is determined; alpha is then taken from `near`.
 pub fn task_coordinates(pose: &Pose, near: &[f64; 6]) -> [f64; 6] {
     let r = &pose.rotation;
-    let [near_alpha, near_beta, near_gamma, ..] = *near;
+    let [near_alpha, ..] = *near;
     let cos_beta = libm::hypot(r.m11, r.m12);
     let beta = libm::atan2(r.m13, cos_beta);
-    let (alpha, gamma) = if cos_beta > 1e-12 {
+    let (alpha, gamma) = if cos_beta > MIN_COS_BETA {
         (libm::atan2(-r.m23, r.m33), libm::atan2(-r.m12, r.m11))
     } else {
         // R = Rx(alpha) Ry(+-90 deg) Rz(gamma): row 2 and 3 hold alpha +- gamma.
         let rest = rotation_y(-beta) * rotation_x(-near_alpha) * r;
         (near_alpha, libm::atan2(rest.m21, rest.m22))
     };
+    let ([alpha, beta, gamma], _) = nearest_angles([alpha, beta, gamma], near);
+    [alpha, beta, gamma, pose.position.x, pose.position.y, pose.position.z]
+}
+
+/// Of the triples of Bryan angles that give the same R, the one nearest to `near`, and whether beta is mirrored in it: `pi - beta`.
+#[inline]
+fn nearest_angles([alpha, beta, gamma]: [f64; 3], near: &[f64; 6]) -> ([f64; 3], bool) {
+    let [near_alpha, near_beta, near_gamma, ..] = *near;
     let pi = core::f64::consts::PI;
     let nearest = |angle: f64, near: f64| angle + ((near - angle) / (2.0 * pi)).round() * 2.0 * pi;
     let candidate = |alpha: f64, beta: f64, gamma: f64| {
@@ -119,8 +146,7 @@ pub fn task_coordinates(pose: &Pose, near: &[f64; 6]) -> [f64; 6] {
         |[a, b, c]: [f64; 3]| (a - near_alpha).powi(2) + (b - near_beta).powi(2) + (c - near_gamma).powi(2);
     let first = candidate(alpha, beta, gamma);
     let second = candidate(alpha + pi, pi - beta, gamma + pi);
-    let [alpha, beta, gamma] = if distance(first) <= distance(second) { first } else { second };
-    [alpha, beta, gamma, pose.position.x, pose.position.y, pose.position.z]
+    if distance(first) <= distance(second) { (first, false) } else { (second, true) }
 }
 
 fn rotation_x(angle: f64) -> Matrix3<f64> {
@@ -163,5 +189,30 @@ mod tests {
             assert!((again.rotation - pose.rotation).amax() < 1e-14);
             assert!(back.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-9), "{back:?} for {x:?}");
         }
+    }
+
+    #[test]
+    fn the_nearest_triple_describes_the_same_motion() {
+        let state = TaskState {
+            x: Vector6::new(0.3, 1.4, -3.0, 0.1, 0.2, 1.0),
+            xd: Vector6::new(1.0, -2.0, 0.5, 0.3, 0.0, -0.1),
+            xdd: Vector6::new(-3.0, 1.0, 2.0, 0.0, 1.0, 0.5),
+        };
+        for near in [[0.4, 1.5, 3.2, 0.0, 0.0, 0.0], [3.4, 1.7, 0.2, 0.0, 0.0, 0.0]] {
+            let nearest = state.nearest_to(&near);
+            let distance = (nearest.x - Vector6::from(near)).rows(0, 3).amax();
+            assert!(distance < 0.2, "{}", nearest.x);
+            let (a, b) = (state.motion(), nearest.motion());
+            assert!((a.pose.rotation - b.pose.rotation).amax() < 1e-14);
+            assert!((a.twist.vector() - b.twist.vector()).amax() < 1e-14);
+            assert!((a.acceleration.vector() - b.acceleration.vector()).amax() < 1e-13);
+        }
+        let locked = TaskState::at_rest([1.0, FRAC_PI_2, 0.5, 0.0, 0.0, 1.0]);
+        let nearest = locked.nearest_to(&[0.7, 1.5, 0.8, 0.0, 0.0, 1.0]);
+        assert!(
+            (nearest.x - Vector6::new(0.7, FRAC_PI_2, 0.8, 0.0, 0.0, 1.0)).amax() < 1e-14,
+            "{}",
+            nearest.x
+        );
     }
 }

@@ -1,5 +1,5 @@
 //! Columns of a CSV table by name, in SI units or in another that the name ends with: `x` or `x_mm`, `t_ms`, `alpha_deg`,
-//! `x_rate_mm_s`, `alpha_accel_deg_s2`, `length_1_mm`, `length_rate_1_mm_s`.
+//! `x_rate_mm_s`, `alpha_accel_deg_s2`, `length_1_mm`, `length_rate_1_mm_s`; or in brackets: `x [mm]`, `x_rate (mm/s)`.
 
 use super::excerpt::excerpt;
 use super::numbers::AXES;
@@ -9,6 +9,13 @@ const TIMES: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 
 const LENGTHS: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
 const ANGLES: [(&str, f64); 3] = [("rad", 1.0), ("mrad", 1e-3), ("deg", core::f64::consts::PI / 180.0)];
 
+/// Spellings in units of characters that no name has.
+const SPELLINGS: [(&str, &str); 6] =
+    [("/", "_"), ("^", ""), ("²", "2"), ("°", "deg"), ("µ", "u"), ("μ", "u")];
+
+/// Other words for columns, only to show a header: angles of other names may be of another order of rotations.
+const WORDS: [(&str, &str); 4] = [("t", "time"), ("alpha", "roll"), ("beta", "pitch"), ("gamma", "yaw")];
+
 /// Column of a file that is one of those to be read.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
@@ -16,40 +23,86 @@ pub(super) struct Column {
     pub index: usize,
     /// Name in the file.
     pub name: String,
+    /// Name without unit.
+    pub quantity: String,
     /// Factor from its unit to SI.
     pub factor: f64,
 }
 
 /// Every column of the header that is the one of this name, in whatever unit.
 pub(super) fn find(header: &[String], name: &str) -> Vec<Column> {
-    let units = units(name);
-    let factor = |found: &str| {
-        let unit = found.strip_prefix(name)?;
-        if unit.is_empty() {
-            return Some(1.0);
-        }
-        let unit = unit.strip_prefix('_')?;
-        units.iter().find(|(known, _)| known == unit).map(|(_, factor)| *factor)
+    let factor = |found: &str| match found.strip_prefix(name)? {
+        "" => Some(1.0),
+        rest => factor(name, rest.strip_prefix('_').or_else(|| in_brackets(rest))?),
     };
-    let columns = header.iter().enumerate();
-    columns
-        .filter_map(|(index, found)| Some(Column { index, name: found.clone(), factor: factor(found)? }))
-        .collect()
+    let column = |(index, found): (usize, &String)| {
+        Some(Column { index, name: found.clone(), quantity: name.into(), factor: factor(found)? })
+    };
+    header.iter().enumerate().filter_map(column).collect()
+}
+
+/// Factor from a unit of a column to SI; none if it is not one of its units.
+pub(super) fn factor(name: &str, unit: &str) -> Option<f64> {
+    let unit = in_brackets(unit).unwrap_or(unit);
+    let unit = SPELLINGS.iter().fold(unit.to_string(), |unit, (from, to)| unit.replace(from, to));
+    units(name).into_iter().find(|(known, _)| *known == unit).map(|(_, factor)| factor)
+}
+
+/// What is in brackets or parentheses.
+fn in_brackets(text: &str) -> Option<&str> {
+    let within = |(open, close)| text.trim().strip_prefix(open)?.strip_suffix(close);
+    [('[', ']'), ('(', ')')].into_iter().find_map(within).map(str::trim)
+}
+
+/// Whether what follows a name is meant as its unit.
+fn is_unit(rest: &str) -> bool {
+    rest.trim_start().starts_with(['_', '[', '('])
+        && !["_rate", "_accel"].iter().any(|part| rest.starts_with(part))
 }
 
 /// What a header has in place of a column that is missing: one with another unit. Empty if there is none.
 pub(super) fn hint(header: &[String], name: &str) -> String {
-    let units: Vec<_> = units(name).into_iter().map(|(unit, _)| unit).collect();
-    let is_like = |found: &&String| {
-        let rest = found.strip_prefix(name).and_then(|rest| rest.strip_prefix('_'));
-        rest.is_some_and(|unit| !["rate", "accel"].iter().any(|part| unit.starts_with(part)))
-    };
-    match header.iter().find(is_like) {
-        Some(found) if !units.is_empty() => {
-            format!(" ({}: its units are {})", excerpt(found), units.join(", "))
-        }
+    let is_like = |found: &&String| found.strip_prefix(name).is_some_and(is_unit);
+    match (header.iter().find(is_like), unit_names(name)) {
+        (Some(found), units) if !units.is_empty() => format!(" ({}: its units are {units})", excerpt(found)),
         _ => String::new(),
     }
+}
+
+/// Units of a column, for people.
+pub(super) fn unit_names(name: &str) -> String {
+    units(name).into_iter().map(|(unit, _)| unit).collect::<Vec<_>>().join(", ")
+}
+
+/// The right header nearest to one that lacks columns: names of other words, case or unit are replaced, others added.
+pub(super) fn nearest_header(header: &[String], required: &[String]) -> Vec<String> {
+    let mut absent: Vec<_> = required.iter().filter(|name| find(header, name).is_empty()).collect();
+    let is_unknown = absent.len() == required.len();
+    let mut nearest: Vec<String> = header.to_vec();
+    for found in &mut nearest {
+        let right = absent.iter().enumerate().find_map(|(k, name)| Some((k, respelled(found, name)?)));
+        if let Some((k, right)) = right {
+            *found = right;
+            absent.remove(k);
+        }
+    }
+    if is_unknown && absent.len() == required.len() {
+        nearest.clear();
+    }
+    nearest.extend(absent.into_iter().cloned());
+    nearest
+}
+
+/// The column with this name that a header means in other words or case, with its unit or else that of SI.
+fn respelled(found: &str, name: &str) -> Option<String> {
+    let found = found.to_lowercase();
+    let words = WORDS.into_iter().filter(|(known, _)| *known == name).map(|(_, word)| word);
+    let rest = words
+        .chain([name])
+        .find_map(|word| found.strip_prefix(word).filter(|rest| rest.is_empty() || is_unit(rest)))?;
+    let right = format!("{name}{rest}");
+    let (unit, _) = units(name).into_iter().next()?;
+    Some(if find(core::slice::from_ref(&right), name).is_empty() { format!("{name}_{unit}") } else { right })
 }
 
 /// Units of a column by its name, each with the factor to SI; none for a name without known quantity.

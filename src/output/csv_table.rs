@@ -6,17 +6,20 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::csv_columns::{Column, find, hint};
+use super::csv_columns::{Column, factor, find, hint, nearest_header, unit_names};
 pub use super::csv_columns::{
     coordinates, derivative_columns, legs, length_columns, pose_columns, trajectory_columns,
 };
 use super::csv_rows::CsvRows;
-use super::excerpt::excerpt;
+use super::excerpt::{excerpt, excerpt_of_length};
 use super::files::{FileError, name_of, open};
 use super::numbers::MAX_MAGNITUDE;
 
 /// Errors shown of one file; a file with more has one mistake many times.
 const MAX_ERRORS_SHOWN: usize = 20;
+
+/// Characters shown of a header; that of a trajectory has 134 without units.
+const MAX_HEADER_SHOWN: usize = 240;
 
 /// Most rows: 2.8 hours at 1 kHz, and 1.8 GB in memory with the columns of a trajectory.
 const MAX_ROWS: usize = 10_000_000;
@@ -49,8 +52,9 @@ impl NumberTable {
     /// Reads the named columns of CSV text, in this order, whatever the order in the text, and ignores other columns.
     /// Every number must be finite and at most 1e12 in magnitude. Error texts name the source `path`.
     ///
-    /// A column may say another unit than SI in its name (`x_mm`, `t_ms`); the rows have SI units. Fields are separated by commas,
-    /// semicolons or tabs, as in the header; where not by commas, a number may have a decimal comma.
+    /// A column may say another unit than SI in its name (`x_mm`, `x [mm]`) or in a row below the header; the rows have SI units.
+    /// Fields are separated by commas, semicolons, tabs or bars, as in the header; where not by commas, a number may have a
+    /// decimal comma. Blank rows and lines that begin with `#` are left out.
     ///
     /// `optional` columns come after the required ones if the text has all of them.
     pub fn from_reader(
@@ -83,14 +87,18 @@ impl NumberTable {
         let names = |record: &csv::ByteRecord| record.iter().map(|name| cell(name).trim().into()).collect();
         let (line, header): (_, Vec<String>) =
             source.next_row()?.map_or((1, vec![]), |(line, record)| (line, names(record)));
-        let columns = errors.columns(line, &header, required, optional);
+        let delimiter = char::from(source.delimiter()).to_string();
+        let mut columns = errors.columns(line, &header, &delimiter, required, optional);
         if !errors.list.is_empty() {
             return Ok(());
         }
-        let (mut read, is_comma_decimal) = (0, source.delimiter() != b',');
+        let (mut read, is_comma_decimal, mut is_first) = (0, delimiter != ",", true);
         while let Some((line, record)) = source.next_row()? {
             if read == MAX_ROWS {
                 return Err(format!("line {line}: a row after {MAX_ROWS}: must be at most those"));
+            }
+            if core::mem::take(&mut is_first) && errors.units(record, line, &mut columns) {
+                continue;
             }
             read += 1;
             if let Some(row) = errors.row(record, line, header.len(), &columns, is_comma_decimal) {
@@ -109,6 +117,11 @@ impl NumberTable {
     /// The rows, each with the requested columns.
     pub fn rows(&self) -> &[Vec<f64>] {
         &self.rows
+    }
+
+    /// The rows, to change their numbers.
+    pub fn rows_mut(&mut self) -> &mut [Vec<f64>] {
+        &mut self.rows
     }
 
     /// The line of the file that each of the rows begins in.
@@ -130,10 +143,26 @@ fn number(text: &str, is_comma_decimal: bool) -> Option<f64> {
     text.parse().ok()
 }
 
+/// Mistake that many rows, or many cells of a column, may have.
+#[derive(Clone, Copy, PartialEq)]
+enum Mistake {
+    FieldCount(usize),
+    NotANumber { column: usize },
+    NotFinite { column: usize },
+    Magnitude { column: usize },
+}
+
+/// An error, or the first of those with the same mistake.
+struct FirstError {
+    text: String,
+    mistake: Option<Mistake>,
+    count: usize,
+}
+
 /// Errors found in the content of one file.
 pub(crate) struct TableErrors {
     path: PathBuf,
-    list: Vec<String>,
+    list: Vec<FirstError>,
     /// Errors beyond those in the list.
     more: usize,
 }
@@ -145,19 +174,33 @@ impl TableErrors {
 
     /// Adds an error: place, value and bound, without the file.
     pub fn add(&mut self, error: String) {
-        if self.list.len() < MAX_ERRORS_SHOWN {
-            self.list.push(format!("{}: {error}", self.path.display()));
+        self.add_first(None, || error);
+    }
+
+    /// Counts an error, and adds it if it is the first with this mistake.
+    fn add_first(&mut self, mistake: Option<Mistake>, error: impl FnOnce() -> String) {
+        if let Some(first) = self.list.iter_mut().find(|first| mistake.is_some() && first.mistake == mistake)
+        {
+            first.count += 1;
+        } else if self.list.len() < MAX_ERRORS_SHOWN {
+            self.list.push(FirstError { text: error(), mistake, count: 1 });
         } else {
             self.more += 1;
         }
     }
 
     /// All errors as one, if there are any.
-    pub fn into_result(mut self) -> Result<(), TableError> {
-        if self.more > 0 {
-            self.list.push(format!("{}: and {} more", self.path.display(), self.more));
-        }
-        if self.list.is_empty() { Ok(()) } else { Err(TableError::Content(self.list)) }
+    pub fn into_result(self) -> Result<(), TableError> {
+        let text = |FirstError { text, mistake, count }| match mistake {
+            Some(Mistake::FieldCount(_)) if count > 1 => format!("{text} (first of {count} such rows)"),
+            Some(_) if count > 1 => format!("{text} (first of {count} such cells)"),
+            _ => text,
+        };
+        let more = (self.more > 0).then(|| format!("and {} more", self.more));
+        let place = self.path.display();
+        let texts = self.list.into_iter().map(text).chain(more).map(|text| format!("{place}: {text}"));
+        let texts: Vec<_> = texts.collect();
+        if texts.is_empty() { Ok(()) } else { Err(TableError::Content(texts)) }
     }
 
     /// Every column to be read.
@@ -165,6 +208,7 @@ impl TableErrors {
         &mut self,
         line: u64,
         header: &[String],
+        delimiter: &str,
         required: &[String],
         optional: &[String],
     ) -> Vec<Column> {
@@ -189,9 +233,19 @@ impl TableErrors {
         };
         let absent = missing(required);
         if !absent.is_empty() {
-            self.add(format!("line {line}: missing columns {}", absent.join(", ")));
-        }
-        if !optional_found.is_empty() && optional_found.len() < optional.len() {
+            let shown = |names: &[String]| excerpt_of_length(&names.join(delimiter), MAX_HEADER_SHOWN);
+            let found = match header {
+                [] => "there is no header".into(),
+                _ => format!("the header is \"{}\"", shown(header)),
+            };
+            let nearest = shown(&nearest_header(header, required));
+            let is_angle = absent.iter().any(|name| name.starts_with("alpha"));
+            let angles = if is_angle { ", with R = Rx(alpha) Ry(beta) Rz(gamma)" } else { "" };
+            self.add(format!(
+                "line {line}: missing columns {}: {found}; the nearest right one is \"{nearest}\"{angles}",
+                absent.join(", ")
+            ));
+        } else if !optional_found.is_empty() && optional_found.len() < optional.len() {
             let absent = missing(optional).join(", ");
             self.add(format!(
                 "line {line}: missing columns {absent}: of {} either all or none must be there",
@@ -202,6 +256,34 @@ impl TableErrors {
         columns
     }
 
+    /// Takes the units of a row that has these in place of numbers; whether it does.
+    fn units(&mut self, record: &csv::ByteRecord, line: u64, columns: &mut [Column]) -> bool {
+        let text = |column: &Column| cell(record.get(column.index).unwrap_or_default()).trim().to_string();
+        let unit = |column: &Column| factor(&column.quantity, &text(column));
+        if !columns.iter().any(|column| unit(column).is_some())
+            || columns.iter().any(|column| number(&text(column), true).is_some())
+        {
+            return false;
+        }
+        for column in columns {
+            let is_free = column.name == column.quantity;
+            match unit(column) {
+                Some(factor) if is_free || factor == column.factor => column.factor = factor,
+                _ if text(column).is_empty() => {}
+                _ => {
+                    let bound =
+                        if is_free { unit_names(&column.quantity) } else { "as in the header".into() };
+                    let (name, unit) = (&column.name, text(column));
+                    self.add(format!(
+                        "line {line}: unit of {name} = \"{}\": must be {bound}",
+                        excerpt(&unit)
+                    ));
+                }
+            }
+        }
+        true
+    }
+
     fn row(
         &mut self,
         record: &csv::ByteRecord,
@@ -210,27 +292,35 @@ impl TableErrors {
         columns: &[Column],
         is_comma_decimal: bool,
     ) -> Option<Vec<f64>> {
-        if record.len() != width {
+        let count = record.len();
+        if count != width {
             let cure = "; with decimal commas the fields must be separated by semicolons";
-            let cure = if record.len() > width && !is_comma_decimal { cure } else { "" };
-            self.add(format!(
-                "line {line}: {} fields: must be {width}, as in the header{cure}",
-                record.len()
-            ));
+            let cure = if count > width && !is_comma_decimal { cure } else { "" };
+            self.add_first(Some(Mistake::FieldCount(count)), || {
+                format!("line {line}: {count} fields: must be {width}, as in the header{cure}")
+            });
             return None;
         }
         let mut row = Vec::with_capacity(columns.len());
-        for Column { index, name, factor } in columns {
-            let text = cell(record.get(*index).unwrap_or_default());
-            match number(text.trim(), is_comma_decimal).map(|value| value * factor) {
-                Some(value) if value.abs() <= MAX_MAGNITUDE => row.push(value),
-                Some(value) => {
-                    let finite = value.is_finite().then(|| format!("at most {MAX_MAGNITUDE:e} in magnitude"));
-                    let bound = finite.unwrap_or("finite".into());
-                    self.add(format!("line {line}: {name} = {}: must be {bound}", excerpt(&text)));
+        for &Column { index: column, ref name, factor, .. } in columns {
+            let text = cell(record.get(column).unwrap_or_default());
+            let mistake = match number(text.trim(), is_comma_decimal).map(|value| value * factor) {
+                Some(value) if value.abs() <= MAX_MAGNITUDE => {
+                    row.push(value);
+                    continue;
                 }
-                None => self.add(format!("line {line}: {name} = \"{}\": must be a number", excerpt(&text))),
-            }
+                Some(value) if value.is_finite() => Mistake::Magnitude { column },
+                Some(_) => Mistake::NotFinite { column },
+                None => Mistake::NotANumber { column },
+            };
+            self.add_first(Some(mistake), || {
+                let (text, place) = (excerpt(&text), format!("line {line}: {name}"));
+                match mistake {
+                    Mistake::NotANumber { .. } => format!("{place} = \"{text}\": must be a number"),
+                    Mistake::NotFinite { .. } => format!("{place} = {text}: must be finite"),
+                    _ => format!("{place} = {text}: must be at most {MAX_MAGNITUDE:e} in magnitude"),
+                }
+            });
         }
         (row.len() == columns.len()).then_some(row)
     }

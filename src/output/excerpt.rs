@@ -5,11 +5,16 @@ const MAX_SHOWN: usize = 60;
 
 /// An excerpt on one line, with control characters escaped, cut where it is long.
 pub fn excerpt(text: &str) -> String {
+    excerpt_of_length(text, MAX_SHOWN)
+}
+
+/// The same, cut after so many characters.
+pub fn excerpt_of_length(text: &str, max_shown: usize) -> String {
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut shown = String::new();
     for (i, c) in words.chars().enumerate() {
         match c {
-            _ if i == MAX_SHOWN => return shown + "...",
+            _ if i == max_shown => return shown + "...",
             c if c.is_control() => shown.extend(c.escape_default()),
             c => shown.push(c),
         }

@@ -43,12 +43,17 @@ fn a_missing_file_is_named() {
 fn missing_columns_are_named() {
     refused(
         format!("{}\n{ROW}\n", LENGTHS.replace("length_2", "lenght_2").replace("t,", "time,")),
-        &["line 1: missing columns t, length_2"],
+        &["line 1: missing columns t, length_2: \
+           the header is \"time,length_1,lenght_2,length_3,length_4,length_5,length_6\"; the nearest right one is \
+           \"t,length_1,lenght_2,length_3,length_4,length_5,length_6,length_2\""],
     );
     let all = "line 1: missing columns t, length_1, length_2, length_3, length_4, length_5, length_6";
-    refused("", &[all]);
-    refused("\n\n", &[all]);
-    refused("0,1,2\n", &[all]);
+    let refused = |text: &str, found: &str| {
+        refused(text, &[&format!("{all}: {found}; the nearest right one is \"{LENGTHS}\"")]);
+    };
+    refused("", "there is no header");
+    refused("\n\n", "there is no header");
+    refused("0,1,2\n", "the header is \"0,1,2\"");
 }
 
 #[test]
@@ -87,22 +92,22 @@ fn everything_wrong_with_the_rows_is_reported_at_once() {
         ("0.6,1.1,1.1,1.1,1.1,-inf,1.1", "line 8: length_5 = -inf: must be finite"),
         ("0.7,1.1,1.1,1.1,1.1,1.1,1e999", "line 9: length_6 = 1e999: must be finite"),
         ("NaN,1.1,1.1,1.1,1.1,1.1,1.1", "line 10: t = NaN: must be finite"),
-        ("0.9,1.1,1.1,1.1,1.1,1.1,1_1", "line 11: length_6 = \"1_1\": must be a number"),
+        (
+            "0.9,1.1,1.1,1.1,1.1,1.1,1_1",
+            "line 11: length_6 = \"1_1\": must be a number (first of 2 such cells)",
+        ),
         ("1.0,1.1 m,1.1,1.1,1.1,1.1,0x1", "line 12: length_1 = \"1.1 m\": must be a number"),
     ];
     let rows: Vec<_> = bad.iter().map(|(row, _)| *row).collect();
-    let mut messages: Vec<_> = bad.iter().map(|(_, message)| *message).collect();
-    messages.push("line 12: length_6 = \"0x1\": must be a number");
+    let messages: Vec<_> = bad.iter().map(|(_, message)| *message).collect();
     refused(format!("{LENGTHS}\n{ROW}\n{}\n{ROW}\n", rows.join("\n")), &messages);
 }
 
 #[test]
 fn one_mistake_many_times_is_not_reported_for_ever() {
     let rows = "0,1.1,1.1,1.1,1.1,1.1\n".repeat(123);
-    let mut lines: Vec<_> =
-        (2..22).map(|line| format!("line {line}: 6 fields: must be 7, as in the header")).collect();
-    lines.push("and 103 more".into());
-    refused(format!("{LENGTHS}\n{rows}"), &lines.iter().map(String::as_str).collect::<Vec<_>>());
+    let line = "line 2: 6 fields: must be 7, as in the header (first of 123 such rows)";
+    refused(format!("{LENGTHS}\n{rows}"), &[line]);
 }
 
 #[test]

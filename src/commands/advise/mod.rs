@@ -74,7 +74,7 @@ impl CommandError for AdviseError {}
 fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, AdviseError> {
     let model = InverseDynamics::new(&config.machine);
     let (scene, comparison, motions) = match trajectory {
-        Some(path) => judge_trajectory(&model, path)?,
+        Some(path) => judge_trajectory(&model, path, &config.machine.home)?,
         None => judge_envelope(config, &model),
     };
     let (times, tolerance) = (time(&model, &motions), config.deployment.control.fidelity_tolerance);
@@ -159,8 +159,9 @@ fn limits(limits: &EnvelopeBounds) -> String {
 fn judge_trajectory(
     model: &InverseDynamics,
     path: &Path,
+    home: &[f64; 6],
 ) -> Result<(String, FidelityComparison, Vec<Motion>), AdviseError> {
-    let table = read_trajectory(path)?;
+    let table = read_trajectory(path, home)?;
     let rows = table.rows();
     let (mut tally, bar) = (ErrorStatistics::default(), item_bar(rows.len(), "rows"));
     let every = rows.len().div_ceil(TIMED_MOTIONS);

@@ -72,8 +72,8 @@ struct TrajectorySource {
     /// A CSV file with t and X, or t, X, X', X''; `-` is standard input
     ///
     /// Columns t, alpha, beta, gamma, x, y, z, and alpha_rate ... z_rate, alpha_accel ... z_accel or none of these, in s, rad and m, or
-    /// with a unit at the end of the name: t_ms, x_mm, alpha_deg, x_rate_mm_s, alpha_accel_deg_s2. Commas, semicolons or tabs
-    /// separate fields; without commas a number may have a decimal comma.
+    /// with a unit at the end of the name, or below it: t_ms, x_mm, x [mm], alpha_deg, x_rate_mm_s, alpha_accel_deg_s2. Commas,
+    /// semicolons, tabs or bars separate fields; without commas a number may have a decimal comma.
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
     /// Let the player that runs slow down along its path, to rest under control

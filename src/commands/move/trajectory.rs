@@ -57,7 +57,7 @@ impl Trajectory {
     /// A trajectory from a CSV file. It must begin and end at rest, its times must increase, and the daemon
     /// must accept it.
     pub fn from_file(config: &Config, path: &Path) -> Result<Self, SetpointError> {
-        let table = read_trajectory(path)?;
+        let table = read_trajectory(path, &config.machine.home)?;
         let path = name_of(path);
         let trajectory = Self::from_rows(&table, path)?;
         trajectory.check(config, &table, path)?;

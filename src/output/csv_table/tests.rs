@@ -45,10 +45,13 @@ fn rows_without_end_are_refused() {
         }
     }
     let message = refusal(b"t,x\n".chain(EndlessRows));
-    assert!(message.starts_with("x.csv: line 2: 1 fields: must be 2, as in the header\n"), "{message}");
-    assert!(
-        message.ends_with(&format!("\nx.csv: and {} more", MAX_ROWS + 1 - MAX_ERRORS_SHOWN)),
-        "{message}"
+    let [first, last] =
+        [format!("first of {MAX_ROWS} such rows"), format!("line {}: a row after", MAX_ROWS + 2)];
+    assert_eq!(
+        message,
+        format!(
+            "x.csv: line 2: 1 fields: must be 2, as in the header ({first})\nx.csv: {last} {MAX_ROWS}: must be at most those"
+        )
     );
 }
 
@@ -100,7 +103,77 @@ fn semicolons_tabs_decimal_commas_and_units_are_read() {
 #[test]
 fn errors_of_the_header_name_its_line() {
     for text in ["\nt,y\n", "\r\nt,y\r\n", "\nt,y"] {
-        assert_eq!(refusal(text.as_bytes()), "x.csv: line 2: missing columns x");
+        let message = refusal(text.as_bytes());
+        assert!(message.starts_with("x.csv: line 2: missing columns x: the header is \"t,y\";"), "{message}");
+    }
+}
+
+/// What programs write around the same two rows, bytes as in the file.
+#[test]
+fn headers_of_other_programs_are_read() {
+    let utf16 =
+        |text: &str, of: fn(u16) -> [u8; 2]| -> Vec<u8> { text.encode_utf16().flat_map(of).collect() };
+    let columns = ["t".into(), "x".into(), "x_rate".into()];
+    for text in [
+        "# exported by \"a tool\n# 2026-11-25\nt,x,x_rate\n0,1.5,2\n# \"half\n0.25,-2e-3,3\n".as_bytes(),
+        b"# from numpy\n# t,x,x_rate\n0.0e+00,1.5,2\n0.25,-2e-3,3\n",
+        b"#t;x;x_rate\n0;1,5;2\n0,25;-2e-3;3\n",
+        b"sep=;\r\nt;x;x_rate;a,b\r\n0;1,5;2;\r\n0,25;-2e-3;3;\r\n",
+        b"sep=\t\nt\tx\tx_rate\n0\t1.5\t2\n0.25\t-2e-3\t3\n",
+        b"t [ms],x [mm],x_rate [mm/s]\n0,1500,2000\n250,-2,3000\n",
+        b"x (um),t (s),x_rate (m_s)\n1500000,0,2\n-2000,0.25,3\n",
+        b"t,x,note,x_rate\ns,mm,,mm/s\n0,1500,a,2000\n0.25,-2,b,3000\n",
+        b"t_ms,x,x_rate\n[ms],(m),\n0,1.5,2\n250,-2e-3,3\n",
+        b"t|x|x_rate\n0|1.5|2\n0.25|-2e-3|3\n",
+        b"\n,,\nt,x,x_rate\n,,\n0,1.5,2\n,,\n0.25,-2e-3,3\n,,\n,,\n",
+        b"t,x,x_rate\r0,1.5,2\r0.25,-2e-3,3",
+        &utf16("\u{feff}t;x;x_rate\r\n0;1,5;2\r\n0,25;-2e-3;3\r\n", u16::to_le_bytes),
+        &utf16("\u{feff}t\tx [µm]\tx_rate\n0\t1500000\t2\n0.25\t-2000\t3", u16::to_be_bytes),
+    ] {
+        let shown = String::from_utf8_lossy(text);
+        let table = NumberTable::from_reader(text, Path::new("x.csv"), &columns, &[])
+            .unwrap_or_else(|error| panic!("{shown}: {error}"));
+        assert_eq!(table.rows().len(), 2, "{shown}");
+        for (found, right) in table.rows().iter().flatten().zip([0.0, 1.5, 2.0, 0.25, -2e-3, 3.0]) {
+            assert!((found - right).abs() < 1e-15, "{shown}: {found}, not {right}");
+        }
+    }
+    let columns = ["t".into(), "x".into()];
+    let text = b"t,x\r0,1\r\r1,2\r";
+    assert_eq!(
+        NumberTable::from_reader(&text[..], Path::new("x.csv"), &columns, &[]).unwrap().lines(),
+        [2, 4]
+    );
+}
+
+#[test]
+fn what_is_not_read_is_one_sentence() {
+    let read =
+        |text: &str| NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &pose_columns(), &[]);
+    let angles = "with R = Rx(alpha) Ry(beta) Rz(gamma)";
+    for (text, wanted) in [
+        (
+            "Time (s),Roll (deg),Pitch (deg),Yaw (deg),X (mm),Y (cm),Z (mm)\n0,0,0,0,0,0,650\n",
+            format!("line 1: missing columns t, alpha, beta, gamma, x, y, z: the header is \"Time (s),Roll (deg),Pitch (deg),Yaw (deg),X (mm),Y (cm),Z (mm)\"; the nearest right one is \"t (s),alpha (deg),beta (deg),gamma (deg),x (mm),y_m,z (mm)\", {angles}"),
+        ),
+        (
+            "0;0;0;0;0;0;0.65\n",
+            format!("line 1: missing columns t, alpha, beta, gamma, x, y, z: the header is \"0;0;0;0;0;0;0.65\"; the nearest right one is \"t;alpha;beta;gamma;x;y;z\", {angles}"),
+        ),
+        (
+            "t,alpha,beta,gamma,x,y [cm],note\n0,0,0,0,0,0,\n",
+            "line 1: missing columns y (y [cm]: its units are m, mm, um), z: the header is \"t,alpha,beta,gamma,x,y [cm],note\"; the nearest right one is \"t,alpha,beta,gamma,x,y_m,note,z\"".into(),
+        ),
+        (
+            "t,alpha,beta,gamma,x_mm,y,z\ns,rad,rad,rad,m,cm,m\n",
+            "line 2: unit of x_mm = \"m\": must be as in the header\nx.csv: line 2: unit of y = \"cm\": must be m, mm, um".into(),
+        ),
+        (
+            &("t,alpha,beta,gamma,x,y,z\n".to_string() + &"0,0,0,0,off,0,0\n".repeat(300) + &"0,0,0,0\n".repeat(200)),
+            "line 2: x = \"off\": must be a number (first of 300 such cells)\nx.csv: line 302: 4 fields: must be 7, as in the header (first of 200 such rows)".into(),
+        ),
+    ] {
+        assert_eq!(read(text).unwrap_err().to_string(), format!("x.csv: {wanted}"));
     }
 }
 

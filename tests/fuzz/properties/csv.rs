@@ -30,8 +30,10 @@ static MACHINE: LazyLock<Machine> = LazyLock::new(|| {
 
 /// Whether the input is accepted by one of the readers; panics where an answer is wrong.
 pub fn hold(input: &[u8]) -> bool {
+    let (source, text) = (input, as_read(input));
+    let input = text.as_slice();
     let read = |required: &[String], optional: &[String]| {
-        let table = NumberTable::from_reader(input, Path::new(PLACE), required, optional);
+        let table = NumberTable::from_reader(source, Path::new(PLACE), required, optional);
         match &table {
             Ok(table) => check_table(table, required.len(), optional.len(), input),
             Err(error) => check_refusal(error, input),
@@ -54,6 +56,22 @@ pub fn hold(input: &[u8]) -> bool {
     motions.is_some() || lengths.is_some()
 }
 
+/// The text of an input: UTF-8 with line feeds.
+fn as_read(input: &[u8]) -> Vec<u8> {
+    let units =
+        |of: fn([u8; 2]) -> u16| -> Vec<u16> { input[2..].as_chunks().0.iter().copied().map(of).collect() };
+    let mut text = match input {
+        [0xff, 0xfe, ..] => String::from_utf16_lossy(&units(u16::from_le_bytes)).into_bytes(),
+        [0xfe, 0xff, ..] => String::from_utf16_lossy(&units(u16::from_be_bytes)).into_bytes(),
+        _ => input.into(),
+    };
+    let end = text.iter().position(|byte| b"\r\n".contains(byte)).unwrap_or(0);
+    if text.get(end) == Some(&b'\r') && text.get(end + 1) != Some(&b'\n') {
+        text.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
+    text
+}
+
 /// Rows of one width, of finite numbers, each with its line.
 fn check_table(table: &NumberTable, required: usize, optional: usize, input: &[u8]) {
     let width = table.rows().first().expect("at least one row").len();
@@ -71,12 +89,13 @@ fn check_table(table: &NumberTable, required: usize, optional: usize, input: &[u
 /// The time of a row is in the line that it is said to begin in, where no quote hides what a line is.
 fn check_line(t: f64, number: usize, input: &[u8]) {
     let line = input.split(|byte| *byte == b'\n').nth(number - 1).expect("a line of the input");
-    let is_in_seconds = !input.windows(2).any(|name| name == b"t_");
+    let of_other_unit: [&[u8]; 4] = [b"t_", b"ms", b"us", b"ns"];
+    let is_in_seconds = !input.windows(2).any(|name| of_other_unit.contains(&name));
     if !input.contains(&b'"') && is_in_seconds {
         let times = String::from_utf8_lossy(line);
-        let is_there = times.split([',', ';', '\t']).any(|x| x.trim().parse() == Ok(t));
+        let is_there = times.split([',', ';', '\t', '|']).any(|x| x.trim().parse() == Ok(t));
         let with_commas =
-            || times.split([';', '\t']).any(|x| x.trim().replacen(',', ".", 1).parse() == Ok(t));
+            || times.split([';', '\t', '|']).any(|x| x.trim().replacen(',', ".", 1).parse() == Ok(t));
         assert!(is_there || with_commas(), "{t} is not in line {number}: {times}");
     }
 }

@@ -8,7 +8,7 @@ pub mod machine;
 pub mod step;
 
 /// Longest line of a message: what is unknown is answered with all that is known.
-const MAX_LINE: usize = 800;
+const MAX_LINE: usize = 1000;
 
 /// The lines of a message, each of bounded length and without what a terminal would obey.
 fn lines(message: &str) -> Vec<&str> {
