@@ -2,8 +2,9 @@
 //!
 //! Each leg may have dry friction of up to Fu, `actuator.friction_uncertainty_n`, beyond the model. While a leg
 //! moves one way, this friction is constant and part of the usual disturbance. When the leg begins to move,
-//! stops or turns around, its friction changes by up to 2 Fu, against the new direction. With b_i the
-//! acceleration by a unit force of leg i and T the time constant of what is usual:
+//! stops or turns around, its friction changes by up to 2 Fu, against the new direction. The error is desired
+//! minus true: in the direction of the motion. With b_i the acceleration by a unit force of leg i and T the time
+//! constant of what is usual:
 //!
 //! ```text
 //! change of a disturbance by friction = sum of b_i f_i      |f_i| <= 2 Fu exp(-t_i / T),  t_i since leg i turned
@@ -63,12 +64,12 @@ impl UnstatedFriction {
         }
     }
 
-    /// Least and largest force on each leg by which friction may recently have changed \[N\].
+    /// Least and largest force of each leg that explains a change of friction in the error \[N\].
     fn forces(&self, friction: f64, shares: &[f64; LEGS]) -> [[f64; 2]; LEGS] {
         let mut forces = [[0.0; 2]; LEGS];
         for ((range, share), direction) in forces.iter_mut().zip(shares).zip(&self.direction) {
             let most = friction * share;
-            *range = [if *direction < 0 { 0.0 } else { -most }, if *direction > 0 { 0.0 } else { most }];
+            *range = [if *direction > 0 { 0.0 } else { -most }, if *direction < 0 { 0.0 } else { most }];
         }
         forces
     }
@@ -128,19 +129,19 @@ mod tests {
         };
         let is_near = |found: f64, expected: f64| (found - expected).abs() < 0.01;
         let [least, most] = play(0.01, 0.001).payload_changes(&EFFECTS);
-        assert!(is_near(least, -12.0) && most == 0.0, "all legs begin to move: {least} {most}");
-        let [least, _] = play(0.01, 10.0).payload_changes(&EFFECTS);
-        assert!(least > -1e-2, "all move one way");
+        assert!(least == 0.0 && is_near(most, 12.0), "all legs begin to move: {least} {most}");
+        let [_, most] = play(0.01, 10.0).payload_changes(&EFFECTS);
+        assert!(most < 1e-2, "all move one way");
         let turned = play(-0.01, 0.001);
-        let [_, most] = turned.payload_changes(&EFFECTS);
-        assert!(is_near(most, 2.0), "one turns around: {most}");
+        let [least, _] = turned.payload_changes(&EFFECTS);
+        assert!(is_near(least, -2.0), "one turns around: {least}");
         let unexplained = |x: f64, y: f64| {
             let rest = turned.unexplained(&EFFECTS, &Vector6::new(x, y, 0.0, 0.0, 0.0, 0.0));
             [rest.x, rest.y]
         };
-        assert_eq!([unexplained(19.0, 0.0), unexplained(-19.0, 0.0)], [[0.0, 0.0], [-19.0, 0.0]]);
-        let [x, y] = unexplained(25.0, 3.0);
-        assert!(is_near(x, 5.0) && is_near(y, 3.0), "{x} {y}");
+        assert_eq!([unexplained(19.0, 0.0), unexplained(-19.0, 0.0)], [[19.0, 0.0], [0.0, 0.0]]);
+        let [x, y] = unexplained(-25.0, 3.0);
+        assert!(is_near(x, -5.0) && is_near(y, 3.0), "{x} {y}");
         let [least, most] = play(-5e-5, 5.0).payload_changes(&EFFECTS);
         assert!(is_near(least, -2.0) && is_near(most, 2.0), "it may stick while others move: {least} {most}");
     }
