@@ -37,11 +37,14 @@ pub(super) fn check(machine: &Machine, legs: &[LegSection], home: &SectionReader
     let base_spans = check_joints(legs, "base_m", |leg| leg.base);
     let platform_spans = check_joints(legs, "platform_m", |leg| leg.platform);
 
-    if let Some(exchanged) = exchanged_home(machine).filter(|exchanged| exchanged.margin_at_home < 0.0) {
+    let pose = machine.home_pose();
+    let is_impossible = |exchanged: &ExchangedHome| {
+        exchanged.margin_at_home < 0.0 || condition(machine, &pose) > MAX_CONDITION
+    };
+    if let Some(exchanged) = exchanged_home(machine).filter(is_impossible) {
         home.reject("pose", format!("must be {exchanged}"));
         return;
     }
-    let pose = machine.home_pose();
     let complete = check_legs(machine, legs, &pose);
     let distinct = check_distinct(legs);
     if base_spans && platform_spans && complete && distinct {

@@ -235,14 +235,25 @@ fn values_that_are_wrong_by_a_thousand_are_warned_of() {
     }
 }
 
-/// A stroke that admits home in either order of its angles and positions.
+/// A long stroke admits home in either order of its angles and positions, also where the other order is singular.
 #[test]
-fn angles_after_positions_are_warned_of_where_the_stroke_admits_both() {
-    let text = FRIED
-        .replace("pose = [0.0, 0.0, 0.0, 1.1, 0.0, 0.0]", "pose = [1.1, 0.0, 0.0, 0.0, 0.0, 0.0]")
-        .replace("min_length_m = 0.85", "min_length_m = 0.05");
-    let warnings = examine(&text).warnings;
-    assert!(warnings.iter().any(|warning| warning.key == "home.pose"), "{warnings:#?}");
+fn angles_after_positions_are_named_where_the_stroke_admits_both() {
+    let exchanged = |file: &str| {
+        let mut table: toml::Table = file.parse().unwrap();
+        table["actuator"].as_table_mut().unwrap().insert("min_length_m".into(), 0.02.into());
+        table["home"]["pose"].as_array_mut().unwrap().rotate_left(3);
+        Config::parse(&table.to_string(), "test.toml")
+    };
+    let warnings = exchanged(OTHERS[6]).unwrap().examine().warnings;
+    let named = |found: &str| {
+        found.contains("alpha, beta, gamma [rad], then x, y, z [m]: at [0.0, 0.0, 0.0, 0.0, 0.0, 0.")
+    };
+    assert!(
+        text(&warnings).iter().any(|warning| warning.starts_with("home.pose") && named(warning)),
+        "{warnings:#?}"
+    );
+    let refused = exchanged(BUILT[2]).unwrap_err().to_string();
+    assert!(refused.lines().count() == 1 && named(&refused), "{refused}");
 }
 
 /// Joints of two legs beside each other are no crossing, however small the distance between them and whatever its direction.
