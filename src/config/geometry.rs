@@ -32,6 +32,10 @@ const MIN_UNIVERSAL_SINE: f64 = 1e-3;
 /// to leave a pose that is singular by itself, near enough that every machine can reach them.
 const EXAMINED_DISTANCE: f64 = 0.2;
 
+/// Largest ratio of position \[m\] to angles \[rad\] of a home within the stroke that has them in the wrong order: C is near the
+/// base origin, and turned by as much as legs are long.
+const MAX_EXCHANGED_RATIO: f64 = 0.1;
+
 /// Checks the joints, then the home pose.
 pub(super) fn check(machine: &Machine, legs: &[LegSection], home: &SectionReader) {
     let base_spans = check_joints(legs, "base_m", |leg| leg.base);
@@ -69,7 +73,8 @@ impl fmt::Display for ExchangedHome {
     }
 }
 
-/// Home with angles and positions exchanged, if every leg is further within its stroke there.
+/// Home with angles and positions exchanged, if every leg is further within its stroke there and home as it was read is
+/// beyond the stroke or unusual.
 pub(super) fn exchanged_home(machine: &Machine) -> Option<ExchangedHome> {
     let margin = |x: [f64; 6]| {
         let lengths = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
@@ -78,7 +83,10 @@ pub(super) fn exchanged_home(machine: &Machine) -> Option<ExchangedHome> {
     let [alpha, beta, gamma, x, y, z] = machine.home;
     let pose = [x, y, z, alpha, beta, gamma];
     let [margin_at_home, exchanged] = [machine.home, pose].map(margin);
-    (exchanged > margin_at_home.max(0.0)).then_some(ExchangedHome { pose, margin_at_home })
+    let is_unusual =
+        Vector3::new(x, y, z).norm() < MAX_EXCHANGED_RATIO * Vector3::new(alpha, beta, gamma).norm();
+    (exchanged > margin_at_home.max(0.0) && (margin_at_home < 0.0 || is_unusual))
+        .then_some(ExchangedHome { pose, margin_at_home })
 }
 
 /// Root mean square distances of points from their mean.

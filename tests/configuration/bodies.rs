@@ -212,5 +212,8 @@ fn singular_homes_are_refused() {
         let (_, best) = message.rsplit_once("poses around it have ").unwrap();
         assert!(best.trim_end_matches(" at best").parse::<f64>().unwrap() < 100.0, "{message}");
     }
-    assert_eq!(found(&at("pose = [1.3, 0, 0, 1.1, 0, 0]")), Vec::<String>::new());
+    let tilted = at("pose = [1.3, 0, 0, 1.1, 0, 0]");
+    assert_eq!(found(&tilted), Vec::<String>::new());
+    let warnings = Config::parse(&tilted, "test.toml").unwrap().examine().warnings;
+    assert!(warnings.iter().all(|warning| warning.key != "home.pose"), "{warnings:#?}");
 }
