@@ -14,6 +14,7 @@ mod values;
 use hexad::config::{Config, ConfigError, Violation};
 
 const FRIED: &str = include_str!("../config/fried2008.toml");
+const SIX_THREE: &str = include_str!("data/six_three.toml");
 const REFERENCE: &str = include_str!("../config/reference.toml");
 
 /// What is wrong with a text; empty if it loads.

@@ -11,10 +11,11 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::model::LEGS;
+use crate::model::forward_kinematics::{Tracker, TrackingResult};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::Machine;
+use crate::model::machine::{Actuator, Machine};
 use crate::model::random::Random;
 use crate::model::rigid::{Pose, Twist};
 
@@ -90,12 +91,14 @@ pub struct OtherMode {
     shift_m: f64,
     /// Every path between the two crosses a singular pose.
     beyond_singularity: bool,
+    /// Whether the stroke does not exclude a path between the two.
+    is_in_reach: bool,
 }
 
 impl OtherMode {
-    /// Whether one may be confused with the other.
+    /// Whether one may be confused with the other: it is near, and the legs may lead there.
     pub fn is_nearby(&self) -> bool {
-        self.distance < CONFUSABLE_DISTANCE
+        self.distance < CONFUSABLE_DISTANCE && self.is_in_reach
     }
 }
 
@@ -113,6 +116,7 @@ pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
     let region =
         SearchRegion { center, turn: SEARCH_TURN_RAD, shift: SEARCH_SHIFT_RADII * machine.joints.radius };
     let found = find_modes(machine, &here.lengths(machine), &region, START_COUNT);
+    let is_in_reach = !is_confined(machine, here);
     let other = |there: &KinematicState| {
         let way = center.displacement_to(there.pose());
         OtherMode {
@@ -120,12 +124,25 @@ pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
             turn_deg: way.angular.norm().to_degrees(),
             shift_m: way.linear.norm(),
             beyond_singularity: there.sensitivity().determinant * here.sensitivity().determinant < 0.0,
+            is_in_reach,
         }
     };
     let mut others: Vec<_> = found.iter().map(other).collect();
     others.retain(|other| other.distance > here.sensitivity().trusted_step);
     others.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     others
+}
+
+/// Whether the stroke leads from a pose to no other one with the same lengths. So it is if none of the poses that it leads to is
+/// singular, because each of them is then the only one with its lengths. Examined are the straight ways of the lengths to
+/// the 64 corners of the stroke, not those in between.
+fn is_confined(machine: &Machine, here: &KinematicState) -> bool {
+    let Actuator { min_length, max_length, .. } = machine.actuator;
+    (0..1_u32 << LEGS).all(|corner| {
+        let end = |leg: usize| if corner & (1 << leg) == 0 { min_length } else { max_length };
+        let mut tracker = Tracker::new(machine, *here.pose());
+        tracker.find(machine, &core::array::from_fn(end)).0 == TrackingResult::Found
+    })
 }
 
 /// The start with this number.

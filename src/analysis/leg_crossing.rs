@@ -4,7 +4,8 @@
 //! a share of the joints' radius away from their ends: two joints beside each other are no crossing. The joints of two legs look
 //! swapped where exchanging them on the platform would make both legs together shorter and keep them further apart: of two segments that
 //! cross in a plane, the two that do not cross are shorter by the triangle inequality, and in space that holds about as long as
-//! the legs pass each other nearer than their joints are.
+//! the legs pass each other nearer than their joints are. Legs that share a joint, as on 6-3 and 3-3 platforms, meet in it:
+//! distances are measured without their share of it.
 //!
 //! Legs have no thickness here: whether cylinders touch each other is not examined.
 
@@ -58,7 +59,12 @@ pub fn leg_crossings(machine: &Machine, pose: &Pose) -> Vec<LegCrossing> {
 }
 
 fn examine(legs: [usize; 2], [[a, b], [c, d]]: [[&Vector3<f64>; 2]; 2], least: f64) -> Option<LegCrossing> {
-    let (found, exchanged) = (closest([a, b], [c, d]), closest([a, d], [c, b]));
+    let joint_size = END_SHARE * (b - a).norm().min((d - c).norm());
+    let shared = |first: &Vector3<f64>, second: &Vector3<f64>| {
+        if (first - second).norm() < joint_size { END_SHARE } else { 0.0 }
+    };
+    let span = (shared(a, c), 1.0 - shared(b, d));
+    let (found, exchanged) = (closest([a, b], [c, d], span), closest([a, d], [c, b], span));
     let shorter = (a - d).norm() + (c - b).norm() < (a - b).norm() + (c - d).norm();
     let kind = if found.is_inside && found.distance < least {
         CrossingKind::Meeting
@@ -77,19 +83,20 @@ struct Closest {
     is_inside: bool,
 }
 
-/// Closest points (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
-fn closest([a, b]: [&Vector3<f64>; 2], [c, d]: [&Vector3<f64>; 2]) -> Closest {
+/// Closest points of the parts of both that are within a span, 0 to 1 from their first to their last point (C. Ericson, Real-Time
+/// Collision Detection, 2005, section 5.1.9).
+fn closest([a, b]: [&Vector3<f64>; 2], [c, d]: [&Vector3<f64>; 2], (low, high): (f64, f64)) -> Closest {
     let (first, second) = (b - a, d - c);
     // The common normal of the two lines, else the nearest end.
     let (gap, f1, f2, cross) = (a - c, first.norm_squared(), second.norm_squared(), first.dot(&second));
     let determinant = f1 * f2 - cross * cross;
     let mut s = if determinant > 0.0 {
-        ((cross * gap.dot(&second) - f2 * gap.dot(&first)) / determinant).clamp(0.0, 1.0)
+        ((cross * gap.dot(&second) - f2 * gap.dot(&first)) / determinant).clamp(low, high)
     } else {
-        0.0
+        low
     };
-    let t = ((first * s + gap).dot(&second) / f2).clamp(0.0, 1.0);
-    s = ((second * t - gap).dot(&first) / f1).clamp(0.0, 1.0);
-    let is_inside = [s, t].iter().all(|share| (END_SHARE..=1.0 - END_SHARE).contains(share));
+    let t = ((first * s + gap).dot(&second) / f2).clamp(low, high);
+    s = ((second * t - gap).dot(&first) / f1).clamp(low, high);
+    let is_inside = [s, t].iter().all(|share| END_SHARE < *share && *share < 1.0 - END_SHARE);
     Closest { distance: (gap + first * s - second * t).norm(), is_inside }
 }

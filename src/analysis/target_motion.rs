@@ -94,17 +94,19 @@ impl BoundedQuantity {
 
 impl fmt::Display for WorkspaceBound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { quantity, value, bound, .. } = self;
+        let Self { quantity, value, bound, margin } = self;
+        // At least one digit of the distance from the bound is shown.
+        let digits = (1.0 - margin.abs().log10()).ceil().clamp(4.0, 9.0) as usize;
         match quantity {
             BoundedQuantity::Length(leg) => write!(
                 f,
-                "leg {}: length {value:.4} m, bound {bound:.4} m (the stroke less limits.stroke_margin_m)",
+                "leg {}: length {value:.digits$} m, bound {bound:.digits$} m (the stroke less limits.stroke_margin_m)",
                 leg + 1
             ),
             BoundedQuantity::Coordinate(axis) => {
                 let unit = if *axis < 3 { "rad" } else { "m" };
                 let name = AXES.get(*axis).unwrap_or(&"");
-                write!(f, "{name} = {value:.4} {unit}, bound {bound:.4} {unit} ([envelope])")
+                write!(f, "{name} = {value:.digits$} {unit}, bound {bound:.digits$} {unit} ([envelope])")
             }
             BoundedQuantity::Condition => {
                 write!(f, "condition {value:.2}, bound {bound:.2} (limits.condition with a margin)")

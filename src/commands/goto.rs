@@ -19,7 +19,7 @@ use crate::control::signals::limits::Limit;
 use crate::model::LEGS;
 use crate::operator::requests::status;
 use crate::output::files::print;
-use crate::output::numbers::{AXES, axis_unit, fixed, percent, significant};
+use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, percent, significant};
 use crate::realtime::stop_request::Stop;
 
 /// Longest time of the motion, as a multiple of the computed time, and an addition \[s\].
@@ -143,11 +143,12 @@ fn drive(
 /// Reports the pose of the platform.
 fn reached(source: &TargetSource, since: Instant) -> Result<(), TargetError> {
     let (elapsed_s, answer) = (since.elapsed().as_secs_f64(), source.status().newest.1);
-    let pose = answer.status.and_then(|report| report.pose).unwrap_or_default();
+    let report = answer.status.unwrap_or_default();
+    let (pose, [shortest, longest]) = (report.pose.unwrap_or_default(), report.stroke_m);
     let text = format!(
         "reached after {elapsed_s:.2} s; the platform stands under control\n{}{}",
         heading(),
-        row("pose", &pose)
+        row("pose", &pose, motion_digits(longest - shortest))
     );
     // The platform has moved, so a closed standard output is not a failure.
     let _ = print(text);
@@ -177,7 +178,9 @@ impl fmt::Display for Plan<'_> {
         let Self { constants, from, origin, to, speed, motion } = self;
         let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
-        writeln!(f, "{}{}{}from is {origin}", heading(), row("from", from), row("to", to))?;
+        let digits = motion_digits(actuator.stroke());
+        let rows = row("from", from, digits) + &row("to", to, digits);
+        writeln!(f, "{}{rows}from is {origin}", heading())?;
         writeln!(
             f,
             "duration  {:.3} s, to within {} mm and {} mrad",
@@ -193,15 +196,16 @@ impl fmt::Display for Plan<'_> {
         )?;
         writeln!(
             f,
-            "leg  length mm (stroke {:.1} to {:.1})  largest rate mm/s (of {:.1})",
-            1e3 * actuator.min_length,
-            1e3 * actuator.max_length,
-            1e3 * actuator.max_rate
+            "leg  length mm (stroke {} to {})  largest rate mm/s (of {})",
+            fixed(1e3 * actuator.min_length, digits - 2),
+            fixed(1e3 * actuator.max_length, digits - 2),
+            fixed(1e3 * actuator.max_rate, digits - 2)
         )?;
         for (leg, ([shortest, longest], rate)) in
             (1..=LEGS).zip(motion.lengths_m.iter().zip(motion.leg_rates_m_s))
         {
-            writeln!(f, "{leg:>3}  {:>9.3} to {:>9.3}  {:>19.3}", 1e3 * shortest, 1e3 * longest, 1e3 * rate)?;
+            let [shortest, longest, rate] = [*shortest, *longest, rate].map(|x| fixed(1e3 * x, digits));
+            writeln!(f, "{leg:>3}  {shortest:>9} to {longest:>9}  {rate:>19}")?;
         }
         let shares = Limit::ALL.into_iter().zip(motion.limited_shares).filter(|(_, share)| *share > 0.0);
         let limits: Vec<_> =
@@ -216,9 +220,9 @@ impl fmt::Display for Plan<'_> {
 }
 
 /// Line with X in millimetres and degrees.
-fn row(name: &str, x: &[f64; 6]) -> String {
+fn row(name: &str, x: &[f64; 6], digits: usize) -> String {
     let numbers: String =
-        x.iter().enumerate().map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, 3))).collect();
+        x.iter().enumerate().map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, digits))).collect();
     format!("{name:10}{numbers}\n")
 }
 

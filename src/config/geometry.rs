@@ -3,6 +3,8 @@
 //! Each check runs on the values that were read without error; a rejected value is NaN here, and NaN passes
 //! (see [`super::reader`]).
 
+use core::fmt;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::machine::{LegSection, rounded};
@@ -13,10 +15,10 @@ use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Pose, Twist};
+use crate::model::task::TaskState;
 
 /// Distance below which two points coincide, as a share of the joints' radius: a micrometre on a machine of a metre,
-/// less than any joint can be placed or measured. The equations would allow two joints in one place, as on
-/// the drawings of 6-3 platforms; a universal or spherical joint of two legs cannot be built.
+/// less than any joint can be placed or measured.
 const COINCIDENCE_SHARE: f64 = 1e-6;
 
 /// Least radius of a body's joints \[m\]: there is no machine of a micrometre, and its cube must have digits.
@@ -30,16 +32,61 @@ const MIN_UNIVERSAL_SINE: f64 = 1e-3;
 /// to leave a pose that is singular by itself, near enough that every machine can reach them.
 const EXAMINED_DISTANCE: f64 = 0.2;
 
+/// Largest ratio of position \[m\] to angles \[rad\] of a home within the stroke that has them in the wrong order: C is near the
+/// base origin, and turned by as much as legs are long.
+const MAX_EXCHANGED_RATIO: f64 = 0.1;
+
 /// Checks the joints, then the home pose.
 pub(super) fn check(machine: &Machine, legs: &[LegSection], home: &SectionReader) {
     let base_spans = check_joints(legs, "base_m", |leg| leg.base);
     let platform_spans = check_joints(legs, "platform_m", |leg| leg.platform);
 
     let pose = machine.home_pose();
+    let is_impossible = |exchanged: &ExchangedHome| {
+        exchanged.margin_at_home < 0.0 || condition(machine, &pose) > MAX_CONDITION
+    };
+    if let Some(exchanged) = exchanged_home(machine).filter(is_impossible) {
+        home.reject("pose", format!("must be {exchanged}"));
+        return;
+    }
     let complete = check_legs(machine, legs, &pose);
-    if base_spans && platform_spans && complete {
+    let distinct = check_distinct(legs);
+    if base_spans && platform_spans && complete && distinct {
         check_condition(machine, legs, &pose, home);
     }
+}
+
+/// Home whose angles are probably in the places of its positions.
+pub(super) struct ExchangedHome {
+    pose: [f64; 6],
+    /// Least distance of a leg from the ends of the stroke at home as it was read \[m\]; negative beyond them.
+    pub margin_at_home: f64,
+}
+
+impl fmt::Display for ExchangedHome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "alpha, beta, gamma [rad], then x, y, z [m]: at {:?} every leg is within its stroke",
+            self.pose
+        )
+    }
+}
+
+/// Home with angles and positions exchanged, if every leg is further within its stroke there and home as it was read is
+/// beyond the stroke or unusual.
+pub(super) fn exchanged_home(machine: &Machine) -> Option<ExchangedHome> {
+    let margin = |x: [f64; 6]| {
+        let lengths = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
+        lengths.map(|length| machine.actuator.margin(length)).into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let [alpha, beta, gamma, x, y, z] = machine.home;
+    let pose = [x, y, z, alpha, beta, gamma];
+    let [margin_at_home, exchanged] = [machine.home, pose].map(margin);
+    let is_unusual =
+        Vector3::new(x, y, z).norm() < MAX_EXCHANGED_RATIO * Vector3::new(alpha, beta, gamma).norm();
+    (exchanged > margin_at_home.max(0.0) && (margin_at_home < 0.0 || is_unusual))
+        .then_some(ExchangedHome { pose, margin_at_home })
 }
 
 /// Root mean square distances of points from their mean.
@@ -67,8 +114,7 @@ impl Spread {
     }
 }
 
-/// Rejects joints of one body that are all on one line or near one point, else any two that coincide. Returns false if
-/// they are on a line or near a point.
+/// Rejects joints of one body that are all on one line or near one point. Returns false if they are.
 fn check_joints(legs: &[LegSection], key: &str, joint: fn(&LegSection) -> Vector3<f64>) -> bool {
     let spread = Spread::of(legs.iter().map(joint));
     let least = COINCIDENCE_SHARE * spread.radius;
@@ -92,20 +138,34 @@ fn check_joints(legs: &[LegSection], key: &str, joint: fn(&LegSection) -> Vector
             return false;
         }
     }
+    true
+}
+
+/// Rejects a leg whose two joint centres are those of another leg: both resist the same motion. Legs may share one centre, as on
+/// 6-3 and 3-3 platforms.
+fn check_distinct(legs: &[LegSection]) -> bool {
+    let ends: [fn(&LegSection) -> Vector3<f64>; 2] = [|leg| leg.base, |leg| leg.platform];
+    let least = ends.map(|end| COINCIDENCE_SHARE * Spread::of(legs.iter().map(end)).radius);
+    let mut is_distinct = true;
     for (i, leg) in legs.iter().enumerate() {
         for (earlier, other) in legs.iter().enumerate().take(i) {
-            let distance = (joint(leg) - joint(other)).norm();
-            if distance < least {
-                let shown = format!("{:?} m from leg[{}].{key}", rounded(distance), earlier + 1);
-                let bound = format!(
-                    "must be at least {:?} m from it ({COINCIDENCE_SHARE:?} of the radius)",
-                    rounded(least)
+            let distances = ends.map(|end| (end(leg) - end(other)).norm());
+            if distances.iter().zip(least).all(|(distance, least)| *distance < least) {
+                let [base, platform] = distances.map(rounded);
+                let shown = format!(
+                    "{base:?} m from the base joint of leg[{}], {platform:?} m from its platform joint",
+                    earlier + 1
                 );
-                leg.reader.reject_as(key, shown, bound);
+                let bound = format!(
+                    "must be at least {COINCIDENCE_SHARE:?} of the joints' radius from one of them: legs may share one joint \
+                     centre, not both"
+                );
+                leg.reader.reject_section(shown, bound);
+                is_distinct = false;
             }
         }
     }
-    true
+    is_distinct
 }
 
 /// Checks each leg at home. Returns whether all have been read and have a direction.

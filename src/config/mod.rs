@@ -30,6 +30,7 @@ pub mod fidelity;
 mod geometry;
 mod machine;
 pub mod machine_name;
+mod nearest;
 mod reader;
 mod syntax;
 pub mod text;

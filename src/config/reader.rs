@@ -11,6 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::bound::{Bound, integer, number};
+use super::nearest::nearest;
 use super::{MAX_VIOLATIONS, Violation};
 use crate::output::excerpt::excerpt;
 
@@ -214,7 +215,12 @@ impl<'t> SectionReader<'t> {
         let known: Vec<&str> = self.known.iter().map(|(key, _)| *key).collect();
         for (key, value) in self.table.into_iter().flatten() {
             if !known.contains(&key.get_ref().as_ref()) {
-                let bound = format!("unknown key, must be one of: {}", known.join(", "));
+                let probable = nearest(key.get_ref(), &known).map(|name| format!(" probably {name},"));
+                let bound = format!(
+                    "unknown key,{} must be one of: {}",
+                    probable.unwrap_or_default(),
+                    known.join(", ")
+                );
                 let line = self.log.line(key.span().start);
                 self.add(line, self.key(&excerpt(key.get_ref())), self.log.shown(value), bound);
             }

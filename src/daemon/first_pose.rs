@@ -50,7 +50,7 @@ fn warn_of_nearby_modes(machine: &Machine, pose: Pose) {
         let x = task_coordinates(&pose, &machine.home);
         warn!(
             "the measured lengths are also those of another pose, {nearest}: see that the platform is where it is \
-             taken to be, {x:.3?}, before you engage"
+             taken to be, {x:.6?}, before you engage"
         );
     }
 }

@@ -16,6 +16,13 @@ pub fn axis_unit(axis: usize) -> (f64, &'static str) {
     if axis < 3 { (1.0_f64.to_degrees(), "deg") } else { (1e3, "mm") }
 }
 
+/// Digits after the point with which millimetres and degrees of a machine are shown: the stroke is at least 100,000 of their
+/// steps, as 750 mm in micrometres. Metres have one more and tenths of the stroke two less.
+pub fn motion_digits(stroke_m: f64) -> usize {
+    // A hair less than 5, so that a round stroke has the same number however it was rounded.
+    (4.99 - (1e3 * stroke_m).log10()).ceil().clamp(3.0, 6.0) as usize
+}
+
 /// A number with three significant digits, with an exponent only where it is very large or small.
 pub fn significant(x: f64) -> String {
     let magnitude = x.abs();
@@ -70,6 +77,7 @@ mod tests {
         ] {
             assert_eq!(significant(x), text);
         }
+        assert_eq!([2.0, 0.75, 0.1, 0.028, 1e-4, 1e-9].map(motion_digits), [3, 3, 3, 4, 6, 6]);
         assert_eq!(percent(0.00123), "0.123 %");
         assert_eq!([0.001, 0.07, 1.0].map(plain_percent), ["0.1 %", "7 %", "100 %"]);
     }

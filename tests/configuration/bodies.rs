@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_3, FRAC_PI_6};
 use hexad::config::{Config, Violation};
 use nalgebra::Vector3;
 
-use super::{FRIED, fried_with, refused, violations};
+use super::{FRIED, SIX_THREE, fried_with, refused, violations};
 
 #[test]
 fn bodies_must_be_possible() {
@@ -74,17 +74,6 @@ fn the_geometry_must_hold_the_platform() {
         "base_m = [1.1, -0.492403876506, 0.086824088833]",
         "leg[3] = 0.0 m long at home: base_m and platform_m must not coincide at home",
     );
-    refused(
-        "platform_m = [0.0, -0.492403876506, 0.086824088833]",
-        "platform_m = [0.0, 0.171010071663, 0.469846310493]",
-        "leg[3].platform_m = 1e-10 m from leg[2].platform_m: must be at least 4.83425e-7 m from it (1e-6 of the \
-         radius)",
-    );
-    refused(
-        "base_m = [0.0, -0.482090707265, -0.574533332339]",
-        "base_m = [0.0, -0.482090707265, 0.574533332339]",
-        "leg[4].base_m = 0.0 m from leg[3].base_m: must be at least 7.25137e-7 m from it (1e-6 of the radius)",
-    );
     let axis = |axis: &str| {
         format!("[[leg]]\nuniversal_axis = {axis}\nbase_m = [0.0, 0.738605814759, 0.13023613325]")
     };
@@ -111,9 +100,14 @@ fn the_geometry_must_hold_the_platform() {
 /// A machine from twelve points, with a stroke for every length.
 fn machine_with(base: [[f64; 3]; 6], platform: [[f64; 3]; 6]) -> String {
     let (head, _) = FRIED.split_once("[[leg]]").unwrap();
-    let legs =
-        base.iter().zip(&platform).map(|(b, p)| format!("[[leg]]\nbase_m = {b:?}\nplatform_m = {p:?}\n"));
-    head.replace("max_length_m = 1.6", "max_length_m = 16") + &legs.collect::<String>()
+    head.replace("max_length_m = 1.6", "max_length_m = 16") + &legs(base, platform)
+}
+
+fn legs(base: [[f64; 3]; 6], platform: [[f64; 3]; 6]) -> String {
+    base.iter()
+        .zip(&platform)
+        .map(|(b, p)| format!("[[leg]]\nbase_m = {b:?}\nplatform_m = {p:?}\n"))
+        .collect()
 }
 
 #[test]
@@ -161,6 +155,44 @@ fn singular_machines_are_refused() {
     assert_eq!(violations(&machine_with(semi(0.7, 0.0), other)), []);
 }
 
+#[test]
+fn two_legs_may_share_one_joint_centre_and_not_both() {
+    let shared =
+        SIX_THREE.replace("platform_m = [0.2656586, -0.1240536, 0.0]", "platform_m = [0.0254, 0.2921, 0.0]");
+    let found = violations(&shared);
+    let [violation] = found.as_slice() else { panic!("{found:#?}") };
+    assert_eq!(
+        violation.to_string(),
+        "leg[3] = 0.0 m from the base joint of leg[2], 0.0 m from its platform joint: must be at least 1e-6 of the joints' \
+         radius from one of them: legs may share one joint centre, not both"
+    );
+    assert_eq!(violation.line, 1 + shared.lines().position(|line| line == "[[leg]]").unwrap() + 2 * 3);
+    // A 6-3 machine, the same with its sides exchanged, and a 3-3 machine.
+    let points = |key: &str| -> [[f64; 3]; 6] {
+        let table: toml::Table = SIX_THREE.parse().unwrap();
+        let point = |leg: usize| table["leg"][leg][key].clone().try_into().unwrap();
+        std::array::from_fn(point)
+    };
+    let [base, platform] = ["base_m", "platform_m"].map(points);
+    let corners = std::array::from_fn(|leg| platform[leg / 2 * 2]);
+    for joints in [(base, platform), (platform, base), (base, corners)] {
+        let text = SIX_THREE.split_once("[[leg]]").unwrap().0.to_owned() + &legs(joints.0, joints.1);
+        let found = Config::parse(&text, "test.toml").unwrap().examine();
+        assert_eq!((found.errors, found.warnings), (vec![], vec![]));
+    }
+}
+
+/// The order is alpha, beta, gamma, x, y, z; the other one puts the platform where no leg reaches.
+#[test]
+fn angles_after_positions_are_named() {
+    refused(
+        "pose = [0.0, 0.0, 0.0, 1.1, 0.0, 0.0]",
+        "pose = [1.1, 0.0, 0.0, 0.0, 0.0, 0.0]",
+        "home.pose = [1.1, 0.0, 0.0, 0.0, 0.0, 0.0]: must be alpha, beta, gamma [rad], then x, y, z [m]: at [0.0, 0.0, 0.0, 1.1, \
+         0.0, 0.0] every leg is within its stroke",
+    );
+}
+
 /// The machine is sound, its home is not.
 #[test]
 fn singular_homes_are_refused() {
@@ -180,5 +212,8 @@ fn singular_homes_are_refused() {
         let (_, best) = message.rsplit_once("poses around it have ").unwrap();
         assert!(best.trim_end_matches(" at best").parse::<f64>().unwrap() < 100.0, "{message}");
     }
-    assert_eq!(found(&at("pose = [1.3, 0, 0, 1.1, 0, 0]")), Vec::<String>::new());
+    let tilted = at("pose = [1.3, 0, 0, 1.1, 0, 0]");
+    assert_eq!(found(&tilted), Vec::<String>::new());
+    let warnings = Config::parse(&tilted, "test.toml").unwrap().examine().warnings;
+    assert!(warnings.iter().all(|warning| warning.key != "home.pose"), "{warnings:#?}");
 }

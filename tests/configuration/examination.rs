@@ -4,7 +4,7 @@ use hexad::config::deployment::default_limits::derived_limits;
 use hexad::config::examination::Examination;
 use hexad::config::{Config, Violation};
 
-use super::{FRIED, REFERENCE};
+use super::{FRIED, REFERENCE, SIX_THREE};
 
 const MOTION_BASE: &str = include_str!("../../config/motion_base.toml");
 const TSAI: &str = include_str!("../../config/tsai2000.toml");
@@ -17,6 +17,15 @@ const OTHERS: [&str; 7] = [
     include_str!("../data/tabletop.toml"),
     include_str!("../data/telescope.toml"),
     include_str!("../data/tilted.toml"),
+];
+/// Machines as they are built: from a piezo stage to the mount of a telescope.
+const BUILT: [&str; 6] = [
+    SIX_THREE,
+    include_str!("../data/hanging_chair.toml"),
+    include_str!("../data/hobby.toml"),
+    include_str!("../data/piezo.toml"),
+    include_str!("../data/plate_3m.toml"),
+    include_str!("../data/telescope_m2.toml"),
 ];
 
 fn load(text: &str) -> Config {
@@ -49,12 +58,13 @@ fn refused(file: &str, line: &str, words: &[&str]) {
 }
 
 #[test]
-fn machines_in_order_are_valid_and_only_the_hanging_one_is_warned_of() {
-    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].into_iter().chain(OTHERS) {
+fn machines_in_order_are_valid_and_only_hanging_ones_are_warned_of() {
+    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].into_iter().chain(OTHERS).chain(BUILT) {
         let (config, found) = (load(file), examine(file));
         assert_eq!(text(&found.errors), [""; 0], "{}", config.name);
         let keys: Vec<_> = found.warnings.iter().map(|warning| warning.key.as_str()).collect();
-        let expected: &[&str] = if config.name == "ceiling" { &["gravity_m_s2"] } else { &[] };
+        let hangs = ["ceiling", "hanging_chair", "telescope_m2"].contains(&config.name.as_str());
+        let expected: &[&str] = if hangs { &["gravity_m_s2"] } else { &[] };
         assert_eq!(keys, expected, "{}: {:#?}", config.name, text(&found.warnings));
     }
 }
@@ -195,6 +205,68 @@ fn two_joints_of_neighbours_that_are_swapped_are_named() {
     println!("{named} swaps named");
     assert_eq!(missed, [], "beside {named} pairs");
     assert!(named >= 90, "{named}: the others do not load");
+}
+
+#[test]
+fn values_that_are_wrong_by_a_thousand_are_warned_of() {
+    let base = |line: &str| format!("{MOTION_BASE}\n{line}\n");
+    let tensor = |share: f64| {
+        let mut table: toml::Table = MOTION_BASE.parse().unwrap();
+        let platform = table["platform"].as_table_mut().unwrap();
+        for (_, moment) in platform["inertia_kg_m2"].as_table_mut().unwrap() {
+            *moment = (share * moment.as_float().unwrap()).into();
+        }
+        table.to_string()
+    };
+    for (file, key, words) in [
+        (tensor(1e-3), "platform.inertia_kg_m2", "0.05 to 3 times the radius of the joints"),
+        (tensor(1e3), "platform.inertia_kg_m2", "0.05 to 3 times the radius of the joints"),
+        (base("[drive]\ndelay_us = 0.0005"), "drive.delay_us", "= 0.0005: plausible is 0, or at least 10"),
+        (base("[drive]\nlag_us = 0.5"), "drive.lag_us", "= 0.5: plausible"),
+        (base("[plant.drive]\ndead_time_us = 0.5"), "plant.drive.dead_time_us", "plausible"),
+        (base("[realtime]\nlate_wakeup_us = 0.2"), "realtime.late_wakeup_us", "at least 1;"),
+        (base("[realtime]\ncpu = 999"), "realtime.cpu", "= 999: this host has the processors 0"),
+        (base("[realtime]\nio_cpu = 999"), "realtime.io_cpu", "= 999: this host has the processors 0"),
+    ] {
+        let found = examine(&file);
+        let named = found.warnings.iter().find(|warning| warning.key == key);
+        let text = named.map(ToString::to_string).unwrap_or_default();
+        assert!(text.contains(words), "{key}: {:#?}", found.warnings);
+    }
+}
+
+/// A long stroke admits home in either order of its angles and positions, also where the other order is singular.
+#[test]
+fn angles_after_positions_are_named_where_the_stroke_admits_both() {
+    let exchanged = |file: &str| {
+        let mut table: toml::Table = file.parse().unwrap();
+        table["actuator"].as_table_mut().unwrap().insert("min_length_m".into(), 0.02.into());
+        table["home"]["pose"].as_array_mut().unwrap().rotate_left(3);
+        Config::parse(&table.to_string(), "test.toml")
+    };
+    let warnings = exchanged(OTHERS[6]).unwrap().examine().warnings;
+    let named = |found: &str| {
+        found.contains("alpha, beta, gamma [rad], then x, y, z [m]: at [0.0, 0.0, 0.0, 0.0, 0.0, 0.")
+    };
+    assert!(
+        text(&warnings).iter().any(|warning| warning.starts_with("home.pose") && named(warning)),
+        "{warnings:#?}"
+    );
+    let refused = exchanged(BUILT[2]).unwrap_err().to_string();
+    assert!(refused.lines().count() == 1 && named(&refused), "{refused}");
+}
+
+/// Joints of two legs beside each other are no crossing, however small the distance between them and whatever its direction.
+#[test]
+fn legs_that_share_a_joint_do_not_cross() {
+    for offset in [1e-6, -1e-6, 1e-4, -1e-4, 1e-3, -1e-3] {
+        let moved = |x: f64, y: f64| format!("base_m = [{}, {}, 0.0]", x + offset, y - 0.5 * offset);
+        let text = SIX_THREE
+            .replacen("base_m = [0.58293, 0.33655, 0.0]", &moved(0.58293, 0.33655), 1)
+            .replacen("base_m = [0.0, -0.6731, 0.0]", &moved(0.0, -0.6731), 1)
+            .replacen("base_m = [-0.58293, 0.33655, 0.0]", &moved(-0.58293, 0.33655), 1);
+        assert_eq!(examine(&text), Examination::default(), "{offset}");
+    }
 }
 
 #[test]

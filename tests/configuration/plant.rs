@@ -86,7 +86,9 @@ fn imperfections_are_refused_with_key_value_and_bound() {
     refused(
         "frequency_hz",
         "frequency",
-        &["plant.external.frequency = 10: unknown key, must be one of: force_n, torque_n_m, frequency_hz"],
+        &[
+            "plant.external.frequency = 10: unknown key, probably frequency_hz, must be one of: force_n, torque_n_m, frequency_hz",
+        ],
     );
     refused(
         "stiffness_n_m = 5e7\n",

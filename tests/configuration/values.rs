@@ -120,8 +120,9 @@ fn keys_are_refused_when_missing_unknown_or_of_the_wrong_shape() {
     refused(
         "min_length_m = 0.85",
         "min_length_m = 0.85\nmin_lenght_m = 0.85",
-        "actuator.min_lenght_m = 0.85: unknown key, must be one of: min_length_m, max_length_m, \
-         max_rate_m_s, max_force_n, reflected_mass_kg, viscous_friction_n_s_m, coulomb_friction_n, friction_uncertainty_n",
+        "actuator.min_lenght_m = 0.85: unknown key, probably min_length_m, must be one of: min_length_m, \
+         max_length_m, max_rate_m_s, max_force_n, reflected_mass_kg, viscous_friction_n_s_m, coulomb_friction_n, \
+         friction_uncertainty_n",
     );
     refused(
         "reference_length_m = 0.83 }",
@@ -131,10 +132,14 @@ fn keys_are_refused_when_missing_unknown_or_of_the_wrong_shape() {
     );
     let sections = "name, gravity_m_s2, platform, actuator, cylinder, rod, home, leg, realtime, limits, \
                     measured, drive, control, setpoint, timeouts, operator, plant, envelope";
-    let unknown = |key: &str| format!("{key}: unknown key, must be one of: {sections}");
-    refused("[home]\n", "[topics]\nx = 1\n\n[home]\n", &unknown("topics"));
-    refused("[home]\n", "[[legs]]\nx = 1\n\n[home]\n", &unknown("legs"));
-    refused("name =", "legs = []\nname =", &unknown("legs = []"));
+    let unknown =
+        |key: &str, probably: &str| format!("{key}: unknown key,{probably} must be one of: {sections}");
+    refused("[home]\n", "[topics]\nx = 1\n\n[home]\n", &unknown("topics", ""));
+    refused("[home]\n", "[[legs]]\nx = 1\n\n[home]\n", &unknown("legs", " probably leg,"));
+    refused("name =", "legs = []\nname =", &unknown("legs = []", " probably leg,"));
+    let misnamed = violations(&fried_with("[actuator]\n", "[actuators]\n"));
+    let named = misnamed.iter().find(|violation| violation.key == "actuators").unwrap().to_string();
+    assert_eq!(named, unknown("actuators", " probably actuator,"));
     refused("name =", "control = 3\nname =", "control = 3: must be a table");
     refused(
         "transverse_inertia_kg_m2 = 0.0038",

@@ -5,7 +5,7 @@ use core::fmt;
 
 use super::report::{CheckReport, LegAtHome};
 use crate::model::sensitivity::CONDITION_MEANING;
-use crate::output::numbers::significant;
+use crate::output::numbers::{motion_digits, significant};
 use crate::output::text_table::{Right, text_table};
 
 impl fmt::Display for CheckReport {
@@ -34,11 +34,13 @@ impl fmt::Display for CheckReport {
 }
 
 fn cells(index: usize, leg: &LegAtHome) -> [String; 7] {
+    let digits = motion_digits(leg.to_shortest_m + leg.to_longest_m) + 1;
+    let metres = |length_m: f64| format!("{length_m:.digits$} m");
     [
         format!("{}", index + 1),
-        format!("{:.4} m", leg.length_m),
-        format!("{:.4} m", leg.to_shortest_m),
-        format!("{:.4} m", leg.to_longest_m),
+        metres(leg.length_m),
+        metres(leg.to_shortest_m),
+        metres(leg.to_longest_m),
         format!("{:.2} N", leg.force_n.unwrap_or(f64::NAN)),
         format!("{:.1} %", 100.0 * leg.force_ratio.unwrap_or(f64::NAN)),
         format!("{:.1} deg", leg.joint_axis_deg),
@@ -97,5 +99,39 @@ impl CheckReport {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use crate::config::examination::Examination;
+
+    const TELESCOPE: &str = include_str!("../../../tests/data/telescope_m2.toml");
+
+    fn checked(text: &str) -> String {
+        CheckReport::new(&Config::parse(text, "a test").unwrap(), &Examination::default()).to_string()
+    }
+
+    #[test]
+    fn lengths_have_digits_that_fit_the_stroke() {
+        let text = checked(include_str!("../../../tests/data/piezo.toml"));
+        assert!(!text.contains("0.0000 m") && !text.contains("0.0001 m"), "{text}");
+        let row: Vec<&str> = text.lines().nth(3).unwrap().split_whitespace().collect();
+        let [length, shortest, longest] =
+            [row[1], row[3], row[5]].map(|number| number.parse::<f64>().unwrap());
+        assert!((shortest + longest - 1e-4).abs() < 2e-7 && (length - 0.08335).abs() < 1e-4, "{text}");
+    }
+
+    /// Another pose with the lengths of home is no reason for another home if no stroke leads there.
+    #[test]
+    fn another_home_is_advised_only_if_the_stroke_leads_to_another_pose() {
+        let advice = "choose a home further away from it";
+        assert!(!checked(TELESCOPE).contains(advice));
+        let longer = TELESCOPE
+            .replace("min_length_m = 0.4789", "min_length_m = 0.2")
+            .replace("max_length_m = 0.5071", "max_length_m = 1.0");
+        assert!(checked(&longer).contains(advice));
     }
 }

@@ -14,6 +14,7 @@ use crate::config::Config;
 use crate::control::signals::state::State;
 use crate::model::LEGS;
 use crate::model::machine::Machine;
+use crate::output::numbers::motion_digits;
 
 /// Head of a page.
 #[derive(Serialize)]
@@ -67,6 +68,8 @@ struct MachineHead {
     platform: [[f64; 3]; LEGS],
     home: [f64; 6],
     gravity: [f64; 3],
+    /// Digits after the point of metres; degrees have one less.
+    digits: usize,
 }
 
 /// Head of a page about a recording.
@@ -123,7 +126,8 @@ fn machine(machine: &Machine) -> MachineHead {
     let joints = &machine.joints;
     let [base, platform] =
         [&joints.base, &joints.platform].map(|lanes| joints.triples.unpack_vectors(lanes).map(Into::into));
-    MachineHead { base, platform, home: machine.home, gravity: machine.gravity.into() }
+    let digits = motion_digits(machine.actuator.stroke()) + 1;
+    MachineHead { base, platform, home: machine.home, gravity: machine.gravity.into(), digits }
 }
 
 /// Text as JSON. Numbers without a value are null.

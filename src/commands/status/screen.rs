@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::operator::protocol::AnswerLine;
 use crate::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
-use crate::output::numbers::{AXES, axis_unit, fixed, significant};
+use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, significant};
 use crate::output::text_table::paragraph;
 
 /// Columns of the screen.
@@ -87,10 +87,11 @@ pub(in crate::commands) fn poses(f: &mut fmt::Formatter<'_>, report: &StatusRepo
         write!(f, "{:>11}", format!("{axis} {}", axis_unit(k).1))?;
     }
     writeln!(f)?;
+    let digits = report_digits(report);
     let error = report.orientation_error_rad.zip(report.position_error_m);
     let error = error.map(|([a, b, c], [x, y, z])| [a, b, c, x, y, z]);
     for (name, numbers, digits) in
-        [("pose", report.pose, 3), ("setpoint", report.setpoint, 3), ("error", error, 4)]
+        [("pose", report.pose, digits), ("setpoint", report.setpoint, digits), ("error", error, digits + 1)]
     {
         write!(f, "{name:10}")?;
         match numbers {
@@ -106,14 +107,19 @@ pub(in crate::commands) fn poses(f: &mut fmt::Formatter<'_>, report: &StatusRepo
     writeln!(f)
 }
 
+/// Digits of millimetres and degrees.
+fn report_digits(report: &StatusReport) -> usize {
+    let [shortest, longest] = report.stroke_m;
+    motion_digits(longest - shortest)
+}
+
 pub(in crate::commands) fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+    let digits = report_digits(report);
+    let coarse = digits - 2;
     let [shortest, longest] = report.stroke_m.map(|length_m| length_m * 1e3);
-    let strokes = format!(
-        "{shortest:.1}{:>width$}",
-        format!("{longest:.1}"),
-        width = BAR - format!("{shortest:.1}").len() + 2
-    );
-    writeln!(f, "leg  length mm  {strokes}    mm/s  force N")?;
+    let [left, right] = [shortest, longest].map(|end| fixed(end, coarse));
+    let strokes = format!("{left}{right:>width$}", width = (BAR + 2).saturating_sub(left.len()));
+    writeln!(f, "leg  length mm  {strokes}     mm/s  force N")?;
     if report.legs.is_empty() {
         return writeln!(f, "{}no measurement{}", " ".repeat(5), "\n".repeat(5));
     }
@@ -122,11 +128,11 @@ pub(in crate::commands) fn legs(f: &mut fmt::Formatter<'_>, report: &StatusRepor
         let share = (length_m * 1e3 - shortest) / (longest - shortest);
         writeln!(
             f,
-            "{:>3}{:>11.3}  {}{:>8}{:>9}  {}",
+            "{:>3}{:>11}  {}{:>9}{:>9}  {}",
             k + 1,
-            length_m * 1e3,
+            fixed(length_m * 1e3, digits),
             bar(share, BAR, '#'),
-            rate_m_s.map_or_else(|| "-".to_owned(), |rate| fixed(rate * 1e3, 1)),
+            rate_m_s.map_or_else(|| "-".to_owned(), |rate| fixed(rate * 1e3, coarse)),
             fixed(*force_n, 1),
             bar(force_n.abs() / report.max_force_n, BAR / 2, if *force_n < 0.0 { '-' } else { '+' }),
         )?;
@@ -278,5 +284,20 @@ pub(in crate::commands) mod tests {
         let leg = line("  1");
         assert_eq!((leg.matches('#').count(), leg.matches('-').count()), (13, 7 + 2), "{leg}");
         assert!(text.contains("singular pose in 0.500 s"), "{text}");
+    }
+
+    #[test]
+    fn a_small_stroke_has_more_digits() {
+        let mut answer = answer();
+        let report = answer.status.as_mut().unwrap();
+        report.stroke_m = [0.083_303_7, 0.083_403_7];
+        report.pose = Some([0.0, 0.0, 1e-6, 0.0, 25e-6, 0.135_012]);
+        report.legs = vec![LegReport { length_m: 0.083_351_2, rate_m_s: Some(-0.01), force_n: -250.0 }; 6];
+        let text = Screen(&answer).to_string();
+        for words in ["0.000057", "0.025000", "135.012000", "83.3037 ", " 83.4037 ", "83.351200", "-10.0000"]
+        {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
     }
 }

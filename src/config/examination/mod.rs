@@ -12,6 +12,7 @@ use super::{Config, ConfigError, Violation};
 
 mod envelope;
 mod machine;
+mod values;
 
 /// Result of an examination.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +27,7 @@ impl Config {
     /// Examines the configuration: some milliseconds, with an envelope up to some seconds.
     pub fn examine(&self) -> Examination {
         let mut examiner = Examiner { config: self, found: Examination::default() };
+        values::examine(&mut examiner);
         machine::examine(&mut examiner);
         envelope::examine(&mut examiner);
         examine_loops(&mut examiner);

@@ -187,8 +187,9 @@ fn check_measurement(
     consistency: &mut RateConsistency,
 ) -> Result<(), Diagnostic> {
     let actuator = &cycle.constants.machine().actuator;
-    if now.length.iter().chain(now.rate.iter().flatten()).any(|value| !value.is_finite()) {
-        return Err(DiagnosticCode::MeasurementNotFinite.into());
+    let not_finite = |values: &[f64; LEGS]| values.iter().position(|value| !value.is_finite());
+    if let Some(leg) = not_finite(&now.length).or_else(|| now.rate.as_ref().and_then(not_finite)) {
+        return Err(Diagnostic::from(DiagnosticCode::MeasurementNotFinite).at(leg));
     }
     check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
     let Some(before) = before else {

@@ -190,12 +190,12 @@ codes! {
     SetpointLost = 100, Stop,
         absolute("age", "s", "exceeds", "timeouts.setpoint_ms"),
         "setpoint lost in motion",
-        "find out why its source ended";
+        "find out why the source sends no setpoints, or sends them late";
     /// Measurements stopped arriving.
     MeasurementLost = 101, Brake,
         absolute("age", "s", "exceeds", "timeouts.measured_ms"),
         "measurement lost",
-        "find out why the driver ended";
+        "find out why the driver sends no measurements, or sends them late";
     /// A setpoint contained a number that is not finite.
     SetpointNotFinite = 102, Stop, NO_NUMBER, "setpoint not finite", "correct the setpoint source";
     /// A measurement contained a number that is not finite.
@@ -455,7 +455,7 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { code, value, bound, index } = self;
         write!(f, "{}", code.name())?;
-        if *code == DiagnosticCode::DriveFault && *index != 0 {
+        if code.comparison() == Comparison::None && *index != 0 {
             write!(f, ": leg {index}")?;
         }
         if *value != 0.0 || *bound != 0.0 {
@@ -509,6 +509,19 @@ impl fmt::Display for Rounded {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_diagnostic_without_a_value_names_its_leg() {
+        let text = Diagnostic::from(DiagnosticCode::MeasurementNotFinite).at(2).to_string();
+        assert_eq!(text, "measurement not finite: leg 3; check the encoders and the driver");
+    }
+
+    #[test]
+    fn a_lost_source_may_be_late_as_well() {
+        for code in [DiagnosticCode::MeasurementLost, DiagnosticCode::SetpointLost] {
+            assert!(code.remedy().contains("or sends them late"), "{code:?}");
+        }
+    }
 
     #[test]
     fn every_fault_has_a_number_from_100_on_and_a_reaction() {

@@ -81,13 +81,12 @@ fn the_first_measurement_is_finite_within_the_stroke_and_recent() {
         }
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for is_rate in [false, true] {
-                let refused = Bench::first(|bench| {
-                    let mut new = Measurement { rate: Some([0.0; LEGS]), ..bench.at(0, 0.0) };
-                    let numbers = if is_rate { new.rate.as_mut().unwrap() } else { &mut new.length };
-                    numbers[leg] = value;
-                    new
-                });
-                assert_eq!(refused, Some(DiagnosticCode::MeasurementNotFinite), "{value} {is_rate}");
+                let mut bench = Bench::new(State::Standby);
+                let mut new = Measurement { rate: Some([0.0; LEGS]), ..bench.at(0, 0.0) };
+                let numbers = if is_rate { new.rate.as_mut().unwrap() } else { &mut new.length };
+                numbers[leg] = value;
+                let expected = Diagnostic::from(DiagnosticCode::MeasurementNotFinite).at(leg);
+                assert_eq!(bench.validate(0, Some(&new)).err(), Some(expected), "{value} {is_rate}");
             }
         }
     }

@@ -107,11 +107,12 @@ function signalAt(sample, name, count) {
   return Array.from({ length: count }, (_, k) => sample(first + k));
 }
 
-// A number as people read it: four digits.
-function rounded(number) {
+// A number as people read it: four digits, and at least so many after the point.
+function rounded(number, least = 0) {
   if (number === null || number !== number) return "–";
   const size = Math.abs(number);
   if (size < 1e-9) return "0";
   if (size < 1e-3 || size >= 1e6) return number.toExponential(2).replace("-", "−");
-  return number.toFixed(size >= 1000 ? 0 : size >= 100 ? 1 : size >= 10 ? 2 : size >= 1 ? 3 : 4).replace("-", "−");
+  const digits = size >= 1000 ? 0 : size >= 100 ? 1 : size >= 10 ? 2 : size >= 1 ? 3 : 4;
+  return number.toFixed(Math.max(digits, least)).replace("-", "−");
 }
