@@ -25,7 +25,7 @@ const MOTIONS: [BuiltInMotion; 5] = [
 const SETTLED_S: f64 = 2.0;
 /// Duration of the motion, as in `hexad demo` \[s\].
 const MOTION_S: f64 = 8.0;
-const EPISODES: u64 = 160;
+const EPISODES: u64 = 12;
 const LONG_EPISODES: u64 = 400;
 
 /// One world by chance; why control ended.

@@ -83,7 +83,7 @@ const SHAKING_RATIO_WITHOUT_INERTIA: f64 = 4.0;
 /// causes 0.9 (2026-11-23).
 const MAX_SWING_BY_DISTURBANCE_STEP: f64 = 1.5;
 /// The same ratio for friction of legs that turned around.
-const MAX_SWING_BY_FRICTION: f64 = 0.6;
+const MAX_SWING_BY_FRICTION: f64 = 0.75;
 /// Rate at which the reference's shaking is forgotten, relative to the rate at which its slow part follows.
 const FORGETTING_RATIO: f64 = 0.3;
 

@@ -33,7 +33,7 @@ const MAX_ONE_LEG_BOUND_M: f64 = 1.5e-4;
 const STICTION_RATIO: f64 = 0.002;
 /// Change of the force on a leg that stands, relative to its unstated friction: from one direction to the other,
 /// with reserve.
-const FRICTION_REVERSAL: f64 = 3.0;
+const FRICTION_REVERSAL: f64 = 4.0;
 /// Time of equal readings from which a larger force is a fault \[s\]. A leg that is not frozen leaves its
 /// step sooner.
 const LONG_S: f64 = 0.05;

@@ -193,16 +193,19 @@ fn row<'a>(config: &Config, failure: &'a Failure, is_quiet: bool, rates: Rates) 
     (failure, Situation::ALL.map(|situation| cell(config, &failure.1, situation, is_quiet, rates)))
 }
 
-/// The table is that of lengths alone.
+/// The table is that of lengths alone, and of friction that nobody stated.
 #[test]
-fn certificate_with_rates_every_failure_is_noticed_and_moves_no_farther() {
+fn certificate_with_rates_or_stated_friction_every_failure_is_noticed_and_moves_no_farther() {
     for (head, config, failures, is_quiet) in
         [("failure", config(), FAILURES, false), ("frozen lengths", quiet(), FROZEN, true)]
     {
-        let rates = [Rates::Always, Rates::Sometimes];
-        let all = failures.iter().flat_map(|failure| rates.map(|rates| (failure, rates)));
-        let rows =
-            cases(all, 13).into_par_iter().map(|(failure, rates)| row(&config, failure, is_quiet, rates));
+        let mut stated = config.clone();
+        stated.machine.actuator.friction_uncertainty = 0.0;
+        let worlds = [(&config, Rates::Always), (&config, Rates::Sometimes), (&stated, Rates::Never)];
+        let all = failures.iter().flat_map(|failure| worlds.map(|world| (failure, world)));
+        let rows = cases(all, 13)
+            .into_par_iter()
+            .map(|(failure, (config, rates))| row(config, failure, is_quiet, rates));
         table::check(head, failures, &rows.collect::<Vec<_>>(), Cell::is_no_worse);
     }
 }
