@@ -1,7 +1,7 @@
 //! The log thread. It turns the records of the real-time thread and the I/O thread into statistics and log
 //! lines, and passes each cycle to the recorder.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 use std::sync::mpsc::{Sender, SyncSender};
 use std::sync::{Arc, OnceLock};
@@ -46,8 +46,12 @@ pub struct LogLinks<'a, 'o> {
     pub statistics: Writer<Statistics>,
     /// Kernel files of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
-    /// Queue to the recorder. If it is full, cycles are lost.
+    /// Queue to the recorder. If it is full, cycles are lost, unless this thread may hold the loop.
     pub recorder: SyncSender<Recorded>,
+    /// Number of the last cycle that was passed on.
+    pub passed_on: &'a AtomicU64,
+    /// Whether time is simulated, so that the loop waits for the recorder.
+    pub may_hold_loop: bool,
     /// Offers that the real-time thread has answered. They return to the reload thread.
     pub answers: Consumer<'a, &'o mut Offer>,
     pub returned: Sender<&'o mut Offer>,
@@ -107,7 +111,8 @@ impl<'o> Log<'o> {
         while let Some(record) = links.records.dequeue() {
             self.collector.add(&record);
             self.return_offer(links, record.cycle);
-            self.record(&links.recorder, &record);
+            self.record(links, &record);
+            links.passed_on.store(record.cycle, Ordering::Relaxed);
             links.first_pose.add(&record);
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);
@@ -143,15 +148,19 @@ impl<'o> Log<'o> {
     }
 
     /// Passes a cycle to the recorder, after its configuration if that is new. If the queue is full, both are
-    /// lost.
-    fn record(&mut self, recorder: &SyncSender<Recorded>, record: &CycleRecord) {
+    /// lost, unless the loop may be held.
+    fn record(&mut self, links: &LogLinks<'_, 'o>, record: &CycleRecord) {
+        let send = |recorded| match links.may_hold_loop {
+            true => links.recorder.send(recorded).is_ok(),
+            false => links.recorder.try_send(recorded).is_ok(),
+        };
         if let Some(loaded) = &self.unrecorded {
-            if recorder.try_send(Recorded::Configuration(loaded.clone())).is_err() {
+            if !send(Recorded::Configuration(loaded.clone())) {
                 return;
             }
             self.unrecorded = None;
         }
-        let _ = recorder.try_send(Recorded::Cycle(message(record)));
+        send(Recorded::Cycle(message(record)));
     }
 
     /// Logs a second publisher, also under control, where it has no effect.

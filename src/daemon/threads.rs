@@ -1,7 +1,7 @@
 //! The threads of the daemon: start, supervision, end.
 
 use core::mem;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::io;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, OnceLock};
@@ -39,7 +39,7 @@ use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::inputs::Input;
 use crate::messages::Statistics;
 use crate::realtime::clock::Monotonic;
-use crate::realtime::cyclic::{self, LoopReport, RECORDS};
+use crate::realtime::cyclic::{self, LoopReport, RECORDS, ReleaseMode};
 use crate::realtime::event::Event;
 use crate::realtime::exchange::exchange;
 use crate::realtime::process::block_signals;
@@ -70,6 +70,8 @@ struct Flags {
     is_ending: AtomicBool,
     /// Set when the daemon is to end and the platform is not under control.
     may_end: AtomicBool,
+    /// Number of the last cycle that the log thread has passed on. In lock-step the next cycles wait for it.
+    passed_on: AtomicU64,
 }
 
 /// Runs the threads until `stop`. Returns the report, and the histograms as CSV.
@@ -119,6 +121,8 @@ pub(super) fn run(
         statistics: statistics_writer,
         files,
         recorder: recorder_links.cycles,
+        passed_on: &flags.passed_on,
+        may_hold_loop: config.deployment.realtime.release == ReleaseMode::Lockstep,
         answers,
         returned: return_offer,
         first_pose: FirstPose::of(&config.machine),
@@ -144,6 +148,7 @@ pub(super) fn run(
         timeouts,
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
+        passed_on: &flags.passed_on,
         progress,
     };
     let control_links = ControlLinks {

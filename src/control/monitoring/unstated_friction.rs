@@ -93,7 +93,8 @@ impl UnstatedFriction {
     pub fn unexplained(&self, effects: &FrictionEffects, sudden: &Vector6<f64>) -> Vector6<f64> {
         let mut rest = effects.force_by_disturbance * sudden;
         for (force, [low, high]) in rest.iter_mut().zip(self.forces(effects.force, &self.sudden)) {
-            *force -= force.clamp(low, high);
+            // Not `clamp`, which may panic.
+            *force -= force.max(low).min(high);
         }
         effects.by_force * rest
     }

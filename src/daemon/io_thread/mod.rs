@@ -7,7 +7,7 @@
 //! time stamps.
 
 use crate::control::signals::state::MessageId;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use heapless::spsc::Producer;
 
@@ -22,7 +22,7 @@ use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::poll_until;
 use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, Statistics};
 use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
-use crate::realtime::cyclic::{ReleaseMode, Timing};
+use crate::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
 use crate::realtime::request_word::{self, RequestWord};
 use crate::realtime::triple_buffer::{Reader, Writer};
 use crate::realtime::usage::ThreadUsage;
@@ -68,6 +68,8 @@ pub struct IoLinks<'a> {
     pub progress: &'a Progress,
     /// Set by this thread when the daemon is to end and the platform is not under control.
     pub may_end: &'a AtomicBool,
+    /// Number of the last cycle that the log thread has passed on.
+    pub passed_on: &'a AtomicU64,
 }
 
 /// Settings of the I/O thread.
@@ -194,7 +196,7 @@ impl IoThread<'_> {
 
     /// Runs a cycle for each measurement, as soon as the setpoint of its instant has arrived, and publishes
     /// the output before the next measurement is received. A request sent before that setpoint takes effect
-    /// in the same cycle.
+    /// in the same cycle. The recorder holds the loop when it is behind, so that no cycle is lost.
     fn run_in_lockstep(&mut self, is_stopped: impl Fn() -> bool) {
         let mut answered_ns = None;
         let next_measurement = |io: &mut Self| {
@@ -222,7 +224,8 @@ impl IoThread<'_> {
             let before = self.published;
             poll_until(&is_stopped, || {
                 self.publish_if_new();
-                (self.published > before).then_some(())
+                let waiting = self.published.saturating_sub(self.links.passed_on.load(Ordering::Relaxed));
+                (self.published > before && waiting < RECORDS as u64 / 2).then_some(())
             });
         }
     }

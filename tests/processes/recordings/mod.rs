@@ -10,6 +10,7 @@ use hexad::recording::reader::{Recording, Summary};
 use crate::support::children::{Ended, Hexad, run};
 use crate::support::machine::Machine;
 
+mod busy_host;
 mod crashes;
 mod earlier;
 mod full_disk;

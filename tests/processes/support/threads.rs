@@ -17,6 +17,11 @@ impl Thread {
         all(process).find(is_it).unwrap_or_else(|| panic!("process {process} has no thread {name}"))
     }
 
+    /// Its number.
+    pub fn id(&self) -> String {
+        self.0.file_name().expect("a number").display().to_string()
+    }
+
     /// Page faults since it began: minor, major.
     pub fn faults(&self) -> [u64; 2] {
         let stat = self.stat();
