@@ -16,6 +16,7 @@ use super::request::carry_out_in_background;
 use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetRefusal, check_target};
 use crate::config::Config;
 use crate::control::constants::Constants;
+use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::DerivativeLimits;
 use crate::control::signals::state::{Request, State};
@@ -117,6 +118,29 @@ pub fn reference_x(config: &Config, answer: &Answer) -> Option<[f64; 6]> {
 pub fn target_x(constants: &Constants, answer: &Answer) -> Option<[f64; 6]> {
     let target = answer.status.as_ref()?.target?;
     check_target(constants, &pose_of(&target)).is_ok().then_some(target)
+}
+
+/// X at which the platform stands under control, held after its source has ended. Otherwise the reason why another
+/// source cannot take over.
+pub fn held_x(config: &Config) -> Result<[f64; 6], String> {
+    let answer = status(&config.name).map_err(|error| error.to_string())?;
+    if let Some(other) = answer.status.as_deref().and_then(other_source) {
+        return Err(TargetError::OtherSource(named(other)).to_string());
+    }
+    let reference = reference_x(config, &answer).filter(|_| has_control(&answer));
+    // Without setpoints, `on_violation = "limit"` holds the reference.
+    let is_holding = answer.diagnostic.code == DiagnosticCode::HoldingPose as u32;
+    let target = answer.status.as_ref().and_then(|report| report.target);
+    let held = if is_holding { reference } else { target };
+    let (Some(held), Some(reference)) = (held, reference) else {
+        let state = answer.state;
+        return Err(format!("the platform follows another source or a stop: the daemon is in {state}"));
+    };
+    let [mm, mrad] = distance(&reference, &held).map(|distance| 1e3 * distance);
+    if is_reached(&reference, &held) {
+        return Ok(held);
+    }
+    Err(format!("the platform is still {mm:.3} mm and {mrad:.3} mrad from the target that it moves to"))
 }
 
 /// Distance \[m\] and angle \[rad\] between two X.
