@@ -11,7 +11,9 @@ use clap::Args;
 use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
 use super::target::pose_options::PoseOptions;
-use super::target::{TargetError, TargetSource, constants, pose_of, reference_x};
+use super::target::{
+    TargetError, TargetSource, constants, has_received, is_reached, pose_of, reference_x, target_x,
+};
 use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetMotion, target_motion};
 use crate::config::Config;
 use crate::control::constants::Constants;
@@ -32,7 +34,7 @@ pub struct GotoArguments {
     machine: MachineFile,
     #[command(flatten)]
     target: PoseOptions,
-    /// Add the coordinates to those of the present pose
+    /// Add the coordinates to those of the target that is held, without one to those of the present pose
     #[arg(long)]
     relative: bool,
     /// Take the coordinates that are not given from the home pose
@@ -62,8 +64,8 @@ impl GotoArguments {
         }
         let config = self.machine.load()?;
         let constants = constants(&config);
-        let (from, origin) = self.start(&config)?;
-        let base = if self.home { config.machine.home } else { from };
+        let ([from, base], origin) = self.start(&config, &constants)?;
+        let base = if self.home { config.machine.home } else { base };
         let to = self.target.applied_to(base, self.relative);
         let motion = target_motion(&constants, &pose_of(&from), &pose_of(&to), self.speed, |_, _| ())
             .map_err(TargetError::Refused)?;
@@ -85,13 +87,18 @@ impl GotoArguments {
         Ok(drive(source, &constants, [from, to], motion.duration_s, &stop)?)
     }
 
-    /// X at the beginning of the motion, and its origin as text.
-    fn start(&self, config: &Config) -> Result<([f64; 6], &'static str), TargetError> {
+    /// X at the beginning of the motion, X to which coordinates are added, which is the target that is held if there is
+    /// one, and the origin of the first as text.
+    fn start(
+        &self,
+        config: &Config,
+        constants: &Constants,
+    ) -> Result<([[f64; 6]; 2], &'static str), TargetError> {
         match status(&config.name) {
             Ok(answer) => reference_x(config, &answer)
-                .map(|x| (x, "where the platform is"))
+                .map(|x| ([x, target_x(constants, &answer).unwrap_or(x)], "where the platform is"))
                 .ok_or(TargetError::UnknownPose(answer.text)),
-            Err(_) if self.dry_run => Ok((config.machine.home, "home, as no daemon answers")),
+            Err(_) if self.dry_run => Ok(([config.machine.home; 2], "home, as no daemon answers")),
             Err(error) => Err(error.into()),
         }
     }
@@ -129,12 +136,12 @@ fn drive(
         if elapsed_s > longest_s {
             return Err(TargetError::TimedOut(longest_s));
         }
-        // An older status would have another pose.
-        if source.status().newest.0 < since {
+        // An older status would have another pose, or another target if the way is short.
+        let (requested, answer) = source.status().newest;
+        if requested < since || !has_received(&answer, &x) {
             continue;
         }
-        let left = pose_of(&source.present_x()?).displacement_to(&pose_of(&x));
-        if left.linear.norm() < REACHED_M && left.angular.norm() < REACHED_RAD {
+        if is_reached(&source.present_x()?, &x) {
             return if resting.is_some() { Err(TargetError::Interrupted) } else { reached(&source, since) };
         }
     }

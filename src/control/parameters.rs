@@ -56,6 +56,8 @@ pub struct Parameters {
     pub following_angular_velocity: f64,
     /// Goal of the stop of a platform that lost its setpoint.
     pub after_loss: AfterStop,
+    /// Time for which a platform without setpoints holds its pose before it parks, if that is the goal \[ns\].
+    pub lost_park_ns: u64,
     /// Largest position error at which control may begin \[m\].
     pub engage_position: f64,
     /// Largest orientation error at which control may begin \[rad\].

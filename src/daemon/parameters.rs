@@ -64,6 +64,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         condition: limits.condition,
         envelope,
         after_loss: control.on_setpoint_lost,
+        lost_park_ns: nanoseconds(control.lost_park_s),
         on_violation: deployment.setpoint.on_violation,
         // A ratio of the scaled limits.
         feedback_scale: limits.feedback_scale / limits.scale,

@@ -5,6 +5,7 @@ use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::prelude::ipc;
 
 use super::bus::{PortError, port_error};
+use super::clock::monotonic_ns;
 use super::{Header, Message};
 
 /// Publisher of one topic, which numbers its messages.
@@ -23,6 +24,12 @@ impl<T: Message> Publisher<T> {
     /// same in each run.
     pub fn with_reproducible_epoch(self) -> Self {
         Self { epoch: None, ..self }
+    }
+
+    /// Begins the epoch now, before the first message. Under control a publisher counts only if it began after the
+    /// last message of the previous one.
+    pub fn begin_epoch(&mut self) {
+        self.epoch = Some(monotonic_ns());
     }
 
     /// Identity of the next message.

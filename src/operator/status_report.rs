@@ -30,6 +30,9 @@ pub struct StatusReport {
     pub pose: Option<[f64; 6]>,
     /// X of the newest setpoint; `None` if none ever arrived, or if it is not finite.
     pub setpoint: Option<[f64; 6]>,
+    /// X of the target that is followed or held; `None` if the newest setpoint is no target, or without control.
+    #[serde(default)]
+    pub target: Option<[f64; 6]>,
     /// Reference minus measured under control, else setpoint minus measured \[m\].
     pub position_error_m: Option<[f64; 3]>,
     /// The same of the orientation \[rad\].

@@ -1,11 +1,12 @@
 //! Setpoints of people, joysticks and simulators under `on_violation = "limit"`: the platform follows as near as the limits
 //! allow, and nothing that is sent is a fault.
 
+use hexad::control::controller::Output;
 use hexad::control::parameters::ViolationPolicy;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::SetpointKind;
 use hexad::control::signals::limits::Limit;
-use hexad::control::signals::state::State;
+use hexad::control::signals::state::{AfterStop, State};
 use hexad::model::random::Random;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
@@ -152,6 +153,44 @@ fn a_source_that_dies_and_comes_back_elsewhere_is_no_fault() {
         // The next source is 5 cm beside the scene, in its middle.
         plays(&mut ride, 2.0, Vector6::new(0.0, 0.0, 0.0, 0.03, -0.04, 0.0));
         ride.assert_limits([0.1, 0.3, 0.3], name);
+    }
+}
+
+/// A simulator dies while the platform is tilted: the pose is held, and after `lost_park_s` the platform moves home.
+#[test]
+fn a_platform_without_setpoints_parks_if_the_file_says_so() {
+    for goal in [AfterStop::Fault, AfterStop::Park] {
+        let mut config = with_policy("motion_base", ViolationPolicy::Limit);
+        (config.deployment.control.on_setpoint_lost, config.deployment.control.lost_park_s) = (goal, 0.5);
+        let mut ride = Ride::new(&config);
+        let there = beside(&ride.home, Vector6::new(0.0, 0.1, 0.0, 0.0, 0.0, 0.03));
+        (0..1000).for_each(|_| _ = ride.follow(Some(there)));
+        let mut path: Vec<(State, DiagnosticCode, u32)> = Vec::new();
+        for _ in 0..4000 {
+            let Output { state, diagnostic, .. } = ride.cycle(SetpointKind::Motion, None);
+            match path.last_mut() {
+                Some((last, code, cycles)) if (*last, *code) == (state, diagnostic.code) => *cycles += 1,
+                _ => path.push((state, diagnostic.code, 1)),
+            }
+        }
+        let parks = DiagnosticCode::ParkingWithoutSetpoints;
+        let expected: &[_] = match goal {
+            AfterStop::Park => &[
+                (State::Active, DiagnosticCode::None),
+                (State::Engaging, DiagnosticCode::HoldingPose),
+                (State::Stopping, parks),
+                (State::Parking, parks),
+                (State::Off, DiagnosticCode::OperatorRequest),
+            ],
+            _ => &[(State::Active, DiagnosticCode::None), (State::Engaging, DiagnosticCode::HoldingPose)],
+        };
+        let found: Vec<_> = path.iter().map(|(state, code, _)| (*state, *code)).collect();
+        assert_eq!(found, expected, "{goal:?}");
+        let goal_pose = if goal == AfterStop::Park { ride.home } else { there };
+        let distance = ride.distance(&goal_pose);
+        println!("{goal:?}: {path:?} {distance:?}");
+        assert!(goal != AfterStop::Park || path[1].2 == 500, "{path:?}");
+        assert!(distance.into_iter().all(|distance| distance < 1e-4), "{goal:?}: {distance:?}");
     }
 }
 

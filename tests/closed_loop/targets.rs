@@ -5,6 +5,7 @@ use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::SetpointKind;
 use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
+use hexad::motion::minimum_jerk::{rise, straight_move};
 use nalgebra::Vector6;
 
 use super::common::limit_check::{Largest, TrueMotion};
@@ -133,4 +134,27 @@ fn control_begins_on_a_target_far_away() {
         println!("{policy:?}: {:?}", felt.largest);
         assert!(velocity < bound && acceleration < bound, "{policy:?}: {velocity} {acceleration}");
     }
+}
+
+/// A stream takes over a target that is held, if it begins there; one that begins elsewhere is not followed.
+#[test]
+fn a_motion_takes_over_a_held_target_only_from_its_pose() {
+    let mut ride = Ride::new(&with_policy("motion_base", ViolationPolicy::Stop));
+    let (home, there) = (ride.home, beside(&ride.home, Vector6::new(0.05, 0.0, 0.0, 0.0, 0.03, -0.04)));
+    for cycle in 0..2000 {
+        ride.cycle(SetpointKind::Target, (cycle == 0).then_some(there));
+    }
+    let follow = |ride: &mut Ride, task: TaskState| {
+        let output = ride.cycle(SetpointKind::Motion, Some(task));
+        assert_eq!((output.state, output.diagnostic.code), (State::Active, DiagnosticCode::None));
+    };
+    (0..500).for_each(|_| follow(&mut ride, home));
+    assert!(ride.distance(&there).into_iter().all(|distance| distance < 1e-6), "a far stream is followed");
+    for cycle in 0..2500 {
+        let profile = rise(1e-3 * f64::from(cycle), 2.0);
+        follow(&mut ride, straight_move(&there.x, &home.x, &profile));
+    }
+    assert!(ride.distance(&home).into_iter().all(|distance| distance < 1e-5), "{:?}", ride.distance(&home));
+    let Largest { acceleration, jerk, .. } = ride.felt.largest;
+    assert!(acceleration < TRUE_ACCELERATION && jerk < TRUE_JERK, "{acceleration} {jerk}");
 }

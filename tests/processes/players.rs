@@ -129,10 +129,57 @@ fn a_player_waits_while_another_source_is_followed() {
     let trio = Trio::in_motion("second-player");
     let file = trio.machine.file.display().to_string();
     let second = Hexad::start(&trio.machine, "move", &["--motion", "sines", "--engage", "--within", "2"]);
-    second.says("waiting: the platform follows another source or a stop: the daemon is in active");
+    second.says("(hexad) publishes setpoints; end it first");
     let Ended { status, stderr, .. } = second.ends_within(HANG);
     assert_eq!(status.code(), Some(1), "{file}: {stderr}");
-    assert!(stderr.contains("not engaged within 2 s: the platform follows another source"), "{stderr}");
+    assert!(stderr.contains("(hexad) publishes setpoints; end it first"), "{stderr}");
     trio.moves_after(monotonic_ns());
     trio.finish();
+}
+
+/// A target that is held has no source any more: a player begins there, without a stop.
+#[test]
+fn a_player_takes_over_a_platform_that_is_held() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("takes-over");
+    let recorder = Recorder::start(&machine.name);
+    let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+    daemon.says("standby: no setpoint");
+    let file = machine.file.display().to_string();
+    let plays = |more: &[&str]| {
+        run(&machine, &[&["move", "--motion", "sines", "--seconds", "1", "--config", &file], more].concat())
+    };
+    let goes = || {
+        let gone = run(&machine, &["goto", "--engage", "--x-mm", "1110", "--config", &file]);
+        assert_eq!(gone.status.code(), Some(0), "{}", gone.stderr);
+    };
+    goes();
+    // The source that holds the target lives.
+    let holding = Hexad::start(&machine, "hold", &["--engage"]);
+    let is_listed = |all: &serde_json::Value| {
+        all.as_array().is_some_and(|all| all.iter().any(|it| it["process_id"] == holding.id()))
+    };
+    recorder.until("the source is listed", |_| {
+        is_listed(&status(&machine)["status"]["sources"][0]["processes"]).then_some(())
+    });
+    let waiting = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "1"]);
+    waiting.says(&format!("waiting: process {} (hexad) publishes setpoints; end it first", holding.id()));
+    drop(holding);
+    let Ended { status: code, stderr, .. } = waiting.ends_within(HANG);
+    assert_eq!(code.code(), Some(0), "{stderr}");
+    assert!(stderr.contains("the daemon is in control: moving"), "{stderr}");
+    does(&machine, "stop", &[], &["standby"]);
+    goes();
+    let Ended { status: code, stderr, .. } = plays(&[]);
+    assert_eq!(code.code(), Some(0), "{stderr}");
+    recorder.until("the motion has ended in standby", |recording| {
+        recording.statuses.last().filter(|status| status.state == State::Standby as u32).map(drop)
+    });
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+    let recording = recorder.finish();
+    rules::hold(&recording);
+    let moved = recording.measured.iter().map(fastest).fold(0.0, f64::max);
+    assert!(moved > 0.1, "the motion was not followed: {moved} m/s");
+    assert!(recording.forces.iter().all(|force| force.state != State::Fault as u32), "no fault");
 }

@@ -102,6 +102,35 @@ fn a_goto_is_refused_before_anything_moves_or_leaves_the_platform_standing() {
     assert!(speed < 1e-3, "a leg moves at {speed} m/s while the platform is to stand");
 }
 
+/// Steps smaller than what counts as reached, of a machine whose legs stick: each is added to the target, not to where
+/// the reference or the platform is.
+#[test]
+fn relative_steps_add_up() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("steps");
+    let text = include_str!("../data/mirror_stiction.toml");
+    let named = text.replace("name = \"mirror_stiction\"", &format!("name = \"{}\"", machine.name));
+    std::fs::write(&machine.file, named).expect("a machine file");
+    let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+    daemon.says("standby: no setpoint");
+    let goes = |more: &[&str]| {
+        let Ended { status, stderr, .. } = goto(&machine, more);
+        assert_eq!(status.code(), Some(0), "{more:?}: {stderr}");
+    };
+    goes(&["--home", "--engage"]);
+    let home = status(&machine)["status"]["target"][5].as_f64().expect("a target");
+    (0..15).for_each(|_| goes(&["--relative", "--z-mm", "0.002"]));
+    let_pass(Duration::from_secs(2));
+    let target = status(&machine)["status"]["target"][5].as_f64().expect("a target");
+    assert!((target - home - 30e-6).abs() < 1e-12, "{home} {target}");
+    let z = pose(&machine)[5];
+    assert!((z - target).abs() < 1e-6, "{z} is not {target}");
+    does(&machine, "stop", &[], &["standby"]);
+    assert!(status(&machine)["status"]["target"].is_null(), "without control there is no target");
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
+
 #[test]
 fn a_dry_run_needs_no_daemon() {
     let machine = Machine::patient("dry-run");

@@ -14,10 +14,11 @@ const GOALS: [AfterStop; 3] = [AfterStop::Standby, AfterStop::Park, AfterStop::F
 /// Every so manieth state with goal and cause in a short run: each state and goal, each cause in some.
 const SHORT_MODES: usize = 5;
 
-/// A code of each kind that the state machine treats differently: brakes, holds, no fault, stops, lost.
-const DISTINCT: [DiagnosticCode; 5] = [
+/// A code of each kind that the state machine treats differently: brakes, holds, parks, no fault, stops, lost.
+const DISTINCT: [DiagnosticCode; 6] = [
     DiagnosticCode::FollowingError,
     DiagnosticCode::HoldingPose,
+    DiagnosticCode::ParkingWithoutSetpoints,
     DiagnosticCode::OperatorRequest,
     DiagnosticCode::SetpointJumped,
     DiagnosticCode::SetpointLost,
@@ -124,7 +125,11 @@ fn certificate_every_transition_is_the_documented_one() {
         takes_no_force_unasked(mode, request, found, then);
     });
     let causes = DiagnosticCode::ALL.len() as u64;
-    let courses = if Certificate::is_long() { (causes + 1).pow(2) } else { 2 * causes + 1 + 25 };
+    let courses = if Certificate::is_long() {
+        (causes + 1).pow(2)
+    } else {
+        2 * causes + 1 + (DISTINCT.len() as u64).pow(2)
+    };
     let rest = 7 * courses * 3 * 3;
     let (all, idle_starts) = (3 * causes * 7, 2 * (causes + 1));
     let every = if Certificate::is_long() { 1 } else { SHORT_MODES as u64 };

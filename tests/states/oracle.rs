@@ -97,6 +97,9 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
         (ends.is_some_and(|found| found.code == DiagnosticCode::SetpointLost), &|| {
             to_stop(ends.unwrap(), after_loss)
         }),
+        (ends.is_some_and(|found| found.code == DiagnosticCode::ParkingWithoutSetpoints), &|| {
+            to_stop(ends.unwrap(), AfterStop::Park)
+        }),
         (ends.is_some_and(|found| found.code.is_fault()), &|| to_stop(ends.unwrap(), AfterStop::Fault)),
         (ends.is_some(), &|| to_stop(ends.unwrap(), AfterStop::Standby)),
         (follows && is(Stop), &|| to_stop(requested, AfterStop::Standby)),

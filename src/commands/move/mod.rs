@@ -1,7 +1,8 @@
 //! `hexad move`: a setpoint source, in real time or in lock-step.
 //!
 //! The source begins at the pose of the platform, which the daemon's status contains. It moves the platform
-//! gently to the start of the trajectory, plays it and ends at rest. When an operator ends control, it ends
+//! gently to the start of the trajectory, plays it and ends at rest. A platform that is held for a source that
+//! has ended is taken over. When an operator ends control, it ends
 //! too. After a fault or a restart of the daemon it starts again from the present pose. A signal slows the
 //! platform down along its path, to rest under control; the exit code is then 130. `--pause` and `--resume`
 //! send requests to the running player.
@@ -190,6 +191,7 @@ fn run_in_real_time(
     prepare_thread(config);
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
+    let mut has_begun = false;
     while !stop.is_repeated() {
         sleep_until(tick_ns);
         if stop.is_requested() && playback.slow_down(tick_ns) {
@@ -198,7 +200,12 @@ fn run_in_real_time(
         playback.set_paused(tick_ns, pause.is_requested());
         match playback.step(tick_ns)? {
             PlaybackStep::Silent => {}
-            PlaybackStep::Setpoint(setpoint) => setpoints.publish(tick_ns, (&setpoint).into())?,
+            PlaybackStep::Setpoint(setpoint) => {
+                if !core::mem::replace(&mut has_begun, true) {
+                    setpoints.begin_epoch();
+                }
+                setpoints.publish(tick_ns, (&setpoint).into())?;
+            }
             PlaybackStep::Finished => break,
         }
         tick_ns = grid.next_after(tick_ns.max(monotonic_ns()));

@@ -9,13 +9,13 @@ use super::engagement::Engagement;
 use super::path::Path;
 use super::rate_change::RateChange;
 use super::trajectory::Trajectory;
+use crate::commands::target::held_x;
 use crate::config::Config;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::Limits;
 use crate::control::signals::state::State;
 use crate::messages::{StatusMessage, Subscriber};
-use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::motion::timeline::Timeline;
 
@@ -25,6 +25,9 @@ const CONTROL_TIMEOUT_NS: u64 = 200_000_000;
 /// Time for which the last pose is published as a target \[ns\], so that the daemon reads many of these
 /// messages.
 const HOLD_TIME_NS: u64 = 100_000_000;
+
+/// Interval of the questions whether the platform is held for a source that has ended \[ns\].
+const INQUIRY_INTERVAL_NS: u64 = 100_000_000;
 
 /// Output of the playback at one instant.
 pub(super) enum PlaybackStep {
@@ -51,7 +54,7 @@ enum Phase {
 
 /// State of the playback of one trajectory.
 pub(super) struct Playback<'a> {
-    machine: &'a Machine,
+    config: &'a Config,
     limits: Limits,
     trajectory: &'a Trajectory,
     statuses: Subscriber<StatusMessage>,
@@ -61,6 +64,8 @@ pub(super) struct Playback<'a> {
     status: Option<StatusMessage>,
     /// Instant of the last status of a daemon in control \[ns\].
     last_active_ns: u64,
+    /// Instant of the next question whether the platform is held for a source that has ended \[ns\].
+    next_inquiry_ns: u64,
     /// Reason for waiting, as last logged.
     reason: String,
     /// Whether the platform is to come to rest for good, and whether until resumed.
@@ -75,16 +80,16 @@ impl<'a> Playback<'a> {
         statuses: Subscriber<StatusMessage>,
         engagement: Engagement,
     ) -> Self {
-        let Config { machine, deployment, .. } = config;
         Self {
-            machine,
-            limits: deployment.limits.in_force(),
+            config,
+            limits: config.deployment.limits.in_force(),
             trajectory,
             statuses,
             engagement,
             phase: Phase::Waiting,
             status: None,
             last_active_ns: 0,
+            next_inquiry_ns: 0,
             reason: String::new(),
             is_ending: false,
             is_to_pause: false,
@@ -194,7 +199,7 @@ impl<'a> Playback<'a> {
 
     fn timeline(&self, from: &Vector6<f64>) -> Timeline {
         let to = self.trajectory.at(0.0).x;
-        let timeline = Timeline::new(self.machine, from, &to, self.trajectory.duration());
+        let timeline = Timeline::new(&self.config.machine, from, &to, self.trajectory.duration());
         timeline.with_shortest_approach(approach_s(&self.limits, from, &to))
     }
 
@@ -231,7 +236,7 @@ impl<'a> Playback<'a> {
         let motion = |task| Ok(PlaybackStep::Setpoint(Setpoint::motion(now_ns, task)));
         match &self.phase {
             Phase::Waiting => {
-                self.wait()?;
+                self.wait(now_ns)?;
                 Ok(PlaybackStep::Silent)
             }
             Phase::Standing(timeline) => {
@@ -277,13 +282,23 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Logs why there is no setpoint yet. An error if that takes too long.
-    fn wait(&mut self) -> Result<(), MoveError> {
+    /// Begins where the platform is held for a source that has ended. Otherwise logs why there is no setpoint yet.
+    /// An error if that takes too long.
+    fn wait(&mut self, now_ns: u64) -> Result<(), MoveError> {
         let reason = match &self.status {
             None => "no status of a daemon".into(),
             Some(status) if status.state().is_some_and(State::has_control) => {
-                let state = status.state().unwrap_or_default();
-                format!("the platform follows another source or a stop: the daemon is in {}", state.name())
+                if now_ns < self.next_inquiry_ns {
+                    return Ok(());
+                }
+                self.next_inquiry_ns = now_ns + INQUIRY_INTERVAL_NS;
+                match held_x(self.config) {
+                    Ok(x) => {
+                        self.phase = Phase::Standing(self.timeline(&x.into()));
+                        return Ok(());
+                    }
+                    Err(reason) => reason,
+                }
             }
             Some(status) => {
                 let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();

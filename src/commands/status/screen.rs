@@ -237,6 +237,7 @@ pub(in crate::commands) mod tests {
             timing: TimingReport { rate_hz: 1000.0, cycles: 1_000_000_000, ..TimingReport::default() },
             pose: Some([-3.1, 3.1, -0.0, -1.2345678, 1.1, 0.0]),
             setpoint: Some([0.1; 6]),
+            target: None,
             position_error_m: Some([-1e-6, 2e-3, 0.0]),
             orientation_error_rad: Some([1e-5; 3]),
             condition: Some(6.789),

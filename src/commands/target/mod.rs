@@ -13,9 +13,10 @@ use self::watch::{StatusWatch, Watched};
 use super::failure::{CommandError, INTERRUPTED, default_exit_code};
 use super::plant::prepare_thread;
 use super::request::carry_out_in_background;
-use crate::analysis::target_motion::{TargetRefusal, check_target};
+use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetRefusal, check_target};
 use crate::config::Config;
 use crate::control::constants::Constants;
+use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::DerivativeLimits;
 use crate::control::signals::state::{Request, State};
@@ -28,7 +29,7 @@ use crate::model::rigid::{Pose, Twist};
 use crate::model::task::{TaskState, task_coordinates};
 use crate::operator::protocol::AnswerLine as Answer;
 use crate::operator::requests::status;
-use crate::operator::status_report::StatusReport;
+use crate::operator::status_report::{ProcessReport, StatusReport};
 use crate::operator::{OperatorError, Order};
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::stop_request::Stop;
@@ -111,6 +112,47 @@ pub fn reference_x(config: &Config, answer: &Answer) -> Option<[f64; 6]> {
     let Some((angular, linear)) = error.filter(|_| has_control(answer)) else { return Some(pose) };
     let error = Twist { angular: Vector3::from(angular), linear: Vector3::from(linear) };
     Some(task_coordinates(&pose_of(&pose).displaced(&error), &config.machine.home))
+}
+
+/// X of the target that is followed or held; `None` if there is none, or if the platform cannot reach it.
+pub fn target_x(constants: &Constants, answer: &Answer) -> Option<[f64; 6]> {
+    let target = answer.status.as_ref()?.target?;
+    check_target(constants, &pose_of(&target)).is_ok().then_some(target)
+}
+
+/// X at which the platform stands under control, held after its source has ended. Otherwise the reason why another
+/// source cannot take over.
+pub fn held_x(config: &Config) -> Result<[f64; 6], String> {
+    let answer = status(&config.name).map_err(|error| error.to_string())?;
+    if let Some(other) = answer.status.as_deref().and_then(other_source) {
+        return Err(TargetError::OtherSource(named(other)).to_string());
+    }
+    let reference = reference_x(config, &answer).filter(|_| has_control(&answer));
+    // Without setpoints, `on_violation = "limit"` holds the reference.
+    let is_holding = answer.diagnostic.code == DiagnosticCode::HoldingPose as u32;
+    let target = answer.status.as_ref().and_then(|report| report.target);
+    let held = if is_holding { reference } else { target };
+    let (Some(held), Some(reference)) = (held, reference) else {
+        let state = answer.state;
+        return Err(format!("the platform follows another source or a stop: the daemon is in {state}"));
+    };
+    let [mm, mrad] = distance(&reference, &held).map(|distance| 1e3 * distance);
+    if is_reached(&reference, &held) {
+        return Ok(held);
+    }
+    Err(format!("the platform is still {mm:.3} mm and {mrad:.3} mrad from the target that it moves to"))
+}
+
+/// Distance \[m\] and angle \[rad\] between two X.
+fn distance(from: &[f64; 6], to: &[f64; 6]) -> [f64; 2] {
+    let left = pose_of(from).displacement_to(&pose_of(to));
+    [left.linear.norm(), left.angular.norm()]
+}
+
+/// Whether X counts as at the target.
+pub fn is_reached(x: &[f64; 6], target: &[f64; 6]) -> bool {
+    let [linear, angular] = distance(x, target);
+    linear < REACHED_M && angular < REACHED_RAD
 }
 
 fn has_control(answer: &Answer) -> bool {
@@ -270,19 +312,24 @@ impl<'a> TargetSource<'a> {
         {
             return Err(TargetError::Ended(answer.state, answer.text));
         }
-        let received = answer.status.and_then(|report| report.setpoint);
-        let is_followed =
-            received.is_some_and(|received| received.iter().zip(x).all(|(a, b)| (a - b).abs() < SAME));
-        if !is_followed && published.max(since).elapsed() > FOLLOWING_LIMIT {
+        if !has_received(&answer, &x) && published.max(since).elapsed() > FOLLOWING_LIMIT {
             return Err(TargetError::NotFollowed);
         }
         Ok(())
     }
 }
 
-/// A process that publishes setpoints and has not ended.
+/// Whether X is that of the newest setpoint of the daemon.
+pub fn has_received(answer: &Answer, x: &[f64; 6]) -> bool {
+    let received = answer.status.as_ref().and_then(|report| report.setpoint);
+    received.is_some_and(|received| received.iter().zip(x).all(|(a, b)| (a - b).abs() < SAME))
+}
+
+/// Another process that publishes setpoints and has not ended.
 fn other_source(report: &StatusReport) -> Option<u32> {
     let sources = report.sources.iter().filter(|source| source.topic == "setpoint");
     let mut processes = sources.flat_map(|source| &source.processes);
-    processes.find(|process| !process.command.is_empty()).map(|process| process.process_id)
+    let lives =
+        |process: &&ProcessReport| !process.command.is_empty() && process.process_id != std::process::id();
+    processes.find(lives).map(|process| process.process_id)
 }

@@ -27,7 +27,7 @@ use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::{Limit, LimitSet, Limits, largest_ratio};
-use crate::control::signals::state::State;
+use crate::control::signals::state::{AfterStop, State};
 use crate::control::signals::time::seconds_between;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::machine::Machine;
@@ -91,10 +91,16 @@ impl SetpointValidator {
         if is_followed && setpoint.kind == SetpointKind::Target {
             return Ok(());
         }
-        let Parameters { on_violation, setpoint_timeout_ns, .. } = &cycle.constants.parameters;
+        let Parameters { on_violation, setpoint_timeout_ns, after_loss, lost_park_ns, .. } =
+            &cycle.constants.parameters;
         let is_at_rest = motion.twist.vector().amax() == 0.0 && motion.acceleration.vector().amax() == 0.0;
         let (release_ns, timeout_ns) = (cycle.release_ns, *setpoint_timeout_ns);
         if *on_violation == ViolationPolicy::Limit && is_followed {
+            if *after_loss == AfterStop::Park {
+                let (code, longest_ns) =
+                    (DiagnosticCode::ParkingWithoutSetpoints, timeout_ns.saturating_add(*lost_park_ns));
+                check_time_stamp(code, setpoint.time_ns, release_ns, longest_ns)?;
+            }
             return check_time_stamp(DiagnosticCode::HoldingPose, setpoint.time_ns, release_ns, timeout_ns);
         }
         let code = if is_at_rest { DiagnosticCode::SetpointEnded } else { DiagnosticCode::SetpointLost };

@@ -199,6 +199,7 @@ fn following(
                 None
             }
             DiagnosticCode::SetpointLost => Some(after_loss),
+            DiagnosticCode::ParkingWithoutSetpoints => Some(AfterStop::Park),
             code if code.is_fault() => Some(AfterStop::Fault),
             _ => Some(AfterStop::Standby),
         };

@@ -112,6 +112,7 @@ pub(in crate::control) fn parameters(machine: &Machine) -> Parameters {
         following_velocity: 0.3,
         following_angular_velocity: 0.3,
         after_loss: AfterStop::default(),
+        lost_park_ns: 10_000_000_000,
         engage_position: 0.01,
         engage_orientation: 0.01,
         following_position: 0.05,

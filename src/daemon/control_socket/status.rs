@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use crate::config::Config;
 use crate::control::signals::diagnostic::Diagnostic;
-use crate::control::signals::inputs::Publishers;
+use crate::control::signals::inputs::{Publishers, SetpointKind};
 use crate::control::signals::limits::{Limit, LimitSet};
+use crate::control::signals::state::State;
 use crate::daemon::process_names::{command, sentence};
 use crate::daemon::reload::Loaded;
 use crate::daemon::snapshot::Snapshot;
@@ -92,6 +93,8 @@ impl StatusSource {
         let Config { name, machine, deployment, place, .. } = &loaded.config;
         let status = &snapshot.status;
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
+        let setpoint = snapshot.setpoint.filter(|setpoint| setpoint.task.is_finite());
+        let follows = matches!(status.state(), Some(State::Engaging | State::Active));
         let limits = Limit::ALL.into_iter().filter(|it| LimitSet(status.active_limits).contains(*it));
         StatusReport {
             version: BUILD.into(),
@@ -109,9 +112,9 @@ impl StatusSource {
             active_limits: limits.map(|limit| limit.name().into()).collect(),
             timing: timing(snapshot, deployment.realtime.rate_hz),
             pose: is_known.then_some(status.x),
-            setpoint: snapshot
-                .setpoint
-                .filter(|setpoint| setpoint.task.is_finite())
+            setpoint: setpoint.map(|setpoint| setpoint.task.x.into()),
+            target: setpoint
+                .filter(|setpoint| setpoint.kind == SetpointKind::Target && follows)
                 .map(|setpoint| setpoint.task.x.into()),
             position_error_m: has_error.then_some(status.position_error_m),
             orientation_error_rad: has_error.then_some(status.orientation_error_rad),
