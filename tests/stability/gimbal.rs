@@ -92,6 +92,8 @@ fn configured(home: &TaskState, world: &Matrix3<f64>) -> Config {
     config.deployment.limits.reference.orientation =
         DerivativeLimits { velocity: 2.0, acceleration: 20.0, jerk: 2000.0 };
     let machine = &mut config.machine;
+    // The reference bounds the forces, which is not the subject.
+    machine.actuator.max_force *= 10.0;
     machine.home = home.x.into();
     let legs = Legs::of(machine);
     machine.joints = Legs {

@@ -197,10 +197,10 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
     }
 }
 
-/// Drives that hold the platform to a distance of a quarter radian, and a motion that goes on. Forces stay at their
-/// limit and say so from the first cycle in which the motion asks for more; the platform gives way, and is let go.
+/// Drives that hold the platform to a distance of a quarter radian, and a motion that goes on: the reference leaves the
+/// motion before the forces reach their limit, says so, and comes to rest.
 #[test]
-fn saturation_on_the_way_is_told_and_ends_in_a_fault() {
+fn drives_that_are_too_weak_on_the_way_are_told_and_end_in_a_stop() {
     for time_s in TIMES_S {
         for distance in [0.15, 0.1, 0.05] {
             let what = format!("{distance} rad, {time_s} s");
@@ -213,41 +213,38 @@ fn saturation_on_the_way_is_told_and_ends_in_a_fault() {
                 })
                 .unwrap() as u32;
             let run = run(&config, time_s, distance);
-            assert!(run.limited.unwrap().abs_diff(more) <= 2, "{what}: {:?}, not {more}", run.limited);
-            assert_eq!(run.force, 20e3, "{what}");
-            // Too far beside its reference, too fast, or feedback saturated for too long, whichever is first.
+            assert!(run.limited.unwrap() < more, "{what}: {:?}, not before {more}", run.limited);
+            assert!(run.force < 20e3, "{what}: {}", run.force);
             let Diagnostic { code, .. } = run.last.diagnostic;
-            let gives_way = matches!(
-                code,
-                DiagnosticCode::FollowingError
-                    | DiagnosticCode::VelocityError
-                    | DiagnosticCode::FeedbackSaturated
-            );
-            assert!(run.last.state == State::Fault && gives_way, "{what}: {:?}", run.last.diagnostic);
+            assert_eq!(code, DiagnosticCode::SetpointBeyondLimits, "{what}: {:?}", run.last.diagnostic);
         }
     }
 }
 
-/// Beside a controller whose drives are strong enough, until the forces part: the wrench that is missing is told.
+/// A payload that the drives cannot hold, beside a controller whose drives can, until the forces part: the wrench that
+/// is missing is told.
 #[test]
 fn what_limited_forces_leave_out_is_told_as_a_wrench() {
     let mut config = motion_base(ANY);
-    let mut strong = Rig::new(&config, &config.machine);
-    config.machine.actuator.max_force = 20e3;
-    let mut rig = Rig::new(&config, &config.machine);
     let home = on_the_way(AT_HOME, &Profile::default());
+    let held = largest(&inverse_dynamics::<Exact>(&config.machine, &home.motion()).unwrap());
+    let mut heavier = config.machine.clone();
+    heavier.platform.mass *= 1.4;
+    let mut strong = Rig::new(&config, &heavier);
+    config.machine.actuator.max_force = held / 0.85;
+    let mut rig = Rig::new(&config, &heavier);
     rig.engage(&home);
     strong.engage(&home);
-    for k in 0.. {
-        let task = there_and_back(f64::from(k) * 1e-3, 1.5, 0.1);
-        let (output, wanted) = (rig.cycle(&rig.input(&task)), strong.cycle(&strong.input(&task)));
+    for _ in 0..10_000 {
+        let (output, wanted) = (rig.cycle(&rig.input(&home)), strong.cycle(&strong.input(&home)));
         if output.active_limits.contains(Limit::Force) {
             let more = Vector6::from(output.force) - Vector6::from(wanted.force);
-            let wrench = leg_wrenches(&config.machine, &task.motion().pose) * more;
+            let wrench = leg_wrenches(&config.machine, &home.motion().pose) * more;
             let apart = (output.wrench_error.vector() - wrench).norm() / wrench.norm();
             assert!(wrench.norm() > 10.0 && apart < 0.01, "{apart}: {wrench} {:?}", output.wrench_error);
-            break;
+            return;
         }
         assert_eq!((output.force, output.wrench_error), (wanted.force, Wrench::default()));
     }
+    panic!("the forces have not parted");
 }

@@ -211,7 +211,8 @@ mod tests {
             let share = f64::from(k) / f64::from(readings);
             let legs = [[1.0 + 8e-6 * share; LEGS], [0.0, 0.0, 0.0, newtons * share, 0.0, 0.0]];
             let length = core::array::from_fn(|leg| if leg == 3 { 1.0 } else { 1.0 + 1e-9 * f64::from(k) });
-            sensors.check(&length, &ReadingErrors::default(), &BOUNDS, || legs).is_err()
+            let errors = ReadingErrors { deviation: 0.0, resolution: 1e-9 };
+            sensors.check(&length, &errors, &BOUNDS, || legs).is_err()
         })
     }
 
@@ -243,10 +244,10 @@ mod tests {
 
     #[test]
     fn a_frozen_leg_is_named_after_its_bound_and_all_six_sooner() {
-        assert_eq!(noticed_um(&[], 0.0), None);
-        let (moved, leg) = noticed_um(&[4], 0.0).unwrap();
+        assert_eq!(noticed_um(&[], 1e-9), None);
+        let (moved, leg) = noticed_um(&[4], 1e-9).unwrap();
         assert!((83.0..89.0).contains(&moved) && leg == 5, "{moved} {leg}");
-        let (moved, _) = noticed_um(&[0, 1, 2, 3, 4, 5], 0.0).unwrap();
+        let (moved, _) = noticed_um(&[0, 1, 2, 3, 4, 5], 1e-9).unwrap();
         assert!((54.0..60.0).contains(&moved), "{moved}");
         let (moved, _) = noticed_um(&[2], 8e-6).unwrap();
         assert!((136.0..142.0).contains(&moved), "{moved}");

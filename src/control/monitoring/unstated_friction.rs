@@ -91,12 +91,12 @@ impl UnstatedFriction {
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     pub fn unexplained(&self, effects: &FrictionEffects, sudden: &Vector6<f64>) -> Vector6<f64> {
-        let mut rest = effects.force_by_disturbance * sudden;
-        for (force, [low, high]) in rest.iter_mut().zip(self.forces(effects.force, &self.sudden)) {
+        let mut explained = effects.force_by_disturbance * sudden;
+        for (force, [low, high]) in explained.iter_mut().zip(self.forces(effects.force, &self.sudden)) {
             // Not `clamp`, which may panic.
-            *force -= force.max(low).min(high);
+            *force = force.max(low).min(high);
         }
-        effects.by_force * rest
+        sudden - effects.by_force * explained
     }
 
     /// Acceleration with which friction may swing the platform \[m/s^2\].

@@ -171,6 +171,9 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
         force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64)
             as u64,
         force_rate: UNLIMITED,
+        // Disturbances are not faults here.
+        payload_change_kg: Some(UNLIMITED),
+        disturbance_step: Some(UNLIMITED),
         feedback_scale: UNLIMITED,
         reading_errors: ReadingErrors { deviation: UNLIMITED, resolution: 0.0 },
         ..parameters
