@@ -48,7 +48,8 @@ fn setpoints_beyond_the_limits_end_in_a_stop_unless_the_policy_is_limit() {
 #[test]
 fn velocity_errors_are_bounded_by_a_share_of_the_limits_unless_given() {
     let bounds = |text: &str| {
-        let control = deployment(text).control;
+        let known = FRIED.replace("max_force_n = 500.0", "max_force_n = 500.0\nfriction_uncertainty_n = 0.0");
+        let control = Config::parse(&format!("{known}{text}"), "test.toml").unwrap().deployment.control;
         (control.following_velocity_m_s, control.following_velocity_rad_s)
     };
     assert_eq!(bounds(""), (0.3 * 1.0, 0.3 * 2.0));

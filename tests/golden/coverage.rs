@@ -19,8 +19,7 @@ use super::{AVX2, input_words};
 use crate::common::rig::parameters;
 
 /// Codes that no stream shows: of the daemon, and of what would be a fault of hexad.
-const UNSEEN: [DiagnosticCode; 3] =
-    [DiagnosticCode::ParkingWithoutSetpoints, DiagnosticCode::DaemonEnding, DiagnosticCode::ForceNotFinite];
+const UNSEEN: [DiagnosticCode; 2] = [DiagnosticCode::DaemonEnding, DiagnosticCode::ForceNotFinite];
 /// Fewest machines, and bounds of slow and fast loops \[Hz\].
 const LEAST_MACHINES: usize = 8;
 const SLOW_HZ: f64 = 250.0;

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::input_matrix::InputMatrix;
-use crate::control::monitoring::unstated_friction::{FrictionEffects, UnstatedFriction};
+use crate::control::monitoring::unstated_friction::{FrictionEffects, USUAL_PAYLOAD_S, UnstatedFriction};
 use crate::control::monitoring::weighting::weighted;
 use crate::control::parameters::Parameters;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -37,11 +37,8 @@ use crate::model::LEGS;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Acceleration, Motion};
 
-/// Time constant of the usual disturbance \[s\], several times the estimator's.
-pub(in crate::control) const USUAL_DISTURBANCE_S: f64 = 0.15;
-/// Time constants of the present and the usual payload \[s\].
+/// Time constant of the present payload \[s\].
 const PAYLOAD_TIME_CONSTANT_S: f64 = 0.03;
-pub(in crate::control) const USUAL_PAYLOAD_S: f64 = 1.0;
 /// Time from the start of control in which any payload is usual, and in which swings decay \[s\].
 const START_S: f64 = 1.0;
 /// Default of `limits.payload_change_kg`, relative to the mass of the platform and to the mass that unstated

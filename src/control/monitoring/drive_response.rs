@@ -21,7 +21,7 @@ use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
-use crate::control::monitoring::disturbance_monitor::USUAL_DISTURBANCE_S;
+use crate::control::monitoring::unstated_friction::USUAL_DISTURBANCE_S;
 use crate::control::monitoring::weighting::{MIN_MISSING_PER_MAX_FORCE, weighted};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;

@@ -16,8 +16,11 @@
 use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
 
-use crate::control::monitoring::disturbance_monitor::{USUAL_DISTURBANCE_S, USUAL_PAYLOAD_S};
 use crate::model::LEGS;
+
+/// Time constants of the usual disturbance, several times the estimator's, and of the usual payload \[s\].
+pub(super) const USUAL_DISTURBANCE_S: f64 = 0.15;
+pub(super) const USUAL_PAYLOAD_S: f64 = 1.0;
 
 /// Rate below which a leg may stick, and below which it stands \[m/s\].
 const STICKING_M_S: f64 = 1e-4;

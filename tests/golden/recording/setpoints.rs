@@ -19,10 +19,19 @@ pub const SCRIPTS: &[Script] = &[
     ("setpoints_beyond_limits_stop", "motion_base", ENVELOPE, beyond_limits_under_stop),
     ("setpoints_wrong_limit", "fried2008", WEAK_DRIVES, wrong_under_limit),
     ("poses_at_60_hz", "telescope", LIMIT, poses),
+    ("parks_under_limit", "motion_base", PARKS, parks),
     ("targets", "tabletop", LIMIT_500, targets),
     ("near_singular_poses", "motion_base", NEAR_SINGULAR, near_singular),
     ("weak_poses", "motion_base", LIMIT, weak_poses),
 ];
+
+const PARKS: &str = "
+[setpoint]
+on_violation = \"limit\"
+[control]
+on_setpoint_lost = \"park\"
+lost_park_s = 0.2
+";
 
 /// Drives that the limits of the reference demand too much of.
 const WEAK_DRIVES: &str = "
@@ -150,6 +159,16 @@ fn poses(recorder: &mut Recorder) {
     recorder.run(300);
     recorder.kind = SetpointKind::Motion;
     recorder.run(150);
+}
+
+/// The source ends while the platform is tilted.
+fn parks(recorder: &mut Recorder) {
+    recorder.run(20);
+    recorder.engage();
+    recorder.go([0.05, 0.0, 0.0, 0.0, 0.0, 0.02], 0.4);
+    recorder.run(450);
+    recorder.fall_silent();
+    recorder.until(State::Off);
 }
 
 fn targets(recorder: &mut Recorder) {
