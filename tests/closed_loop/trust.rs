@@ -47,6 +47,8 @@ fn freeze(config: &Config, share: f64, legs: &[usize], noise: f64, from_s: f64) 
     if noise > 0.0 {
         (config.deployment.noise.length_m, config.deployment.noise.length_step_m) = (noise, 1e-6);
     }
+    // The machine has no friction, and its file states that: a leg that sticks would look like a frozen sensor.
+    config.machine.actuator.friction_uncertainty = 0.0;
     let config = &config;
     let sensor = SensorErrors { length_noise: noise, length_step: 1e-6, ..SensorErrors::default() };
     let mut control = HardwareLoop::new(

@@ -65,6 +65,8 @@ impl Situation {
     pub fn world(self, mode: ControlMode, policy: ViolationPolicy, rates: Rates) -> World {
         let (mut config, _) = machine(mode);
         config.deployment.setpoint.on_violation = policy;
+        // The model is exact here, and the file states that.
+        config.machine.actuator.friction_uncertainty = 0.0;
         if self == Self::Engaging {
             config.deployment.limits.reference.autonomous_scale = SLOW_SCALE;
         }
