@@ -33,7 +33,7 @@ fn another_pose_near_the_first_is_told_once() {
     let said = daemon.stops_on("TERM", HANG).stderr;
     let lines: Vec<_> = said.lines().filter(|line| line.contains(WORDS)).collect();
     let words = "16.1 deg and 0.076 m away, across a singular pose: see that the platform is where it is taken to \
-                 be, [1.430, 0.000, 0.000, 1.100, 0.000, 0.000], before you engage";
+                 be, [1.430000, 0.000000, 0.000000, 1.100000, 0.000000, 0.000000], before you engage";
     assert!(lines.len() == 1 && lines[0].contains(words) && lines[0].contains("WARN"), "{said}");
 }
 
