@@ -31,7 +31,9 @@ fn in_lock_step_a_recorder_without_a_processor_loses_no_cycle() {
     thread::scope(|threads| {
         threads.spawn(|| {
             scheduling::bind_to_cpu(CPU).unwrap();
-            while !is_over.load(Ordering::Relaxed) {}
+            while !is_over.load(Ordering::Relaxed) {
+                std::hint::spin_loop();
+            }
         });
         let plant = Hexad::start::<&str>(&machine, "plant", &[]);
         let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "3", "--engage"]);
