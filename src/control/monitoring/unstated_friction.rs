@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The checks of payload, impact and swings permit such changes. A leg that sticks while the reference moves
-//! takes a change of force of 2 Fu, see [`frozen_sensors`](super::frozen_sensors).
+//! takes a change of force of 2 Fu, see `frozen_sensors`.
 
 use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Serialize};
