@@ -34,7 +34,7 @@ pub struct GotoArguments {
     machine: MachineFile,
     #[command(flatten)]
     target: PoseOptions,
-    /// Add the coordinates to those of the target that is held, without one to those of the present pose
+    /// Add the coordinates to the target that is held, or to the present pose if no target is held
     #[arg(long)]
     relative: bool,
     /// Take the coordinates that are not given from the home pose

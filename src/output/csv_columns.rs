@@ -93,7 +93,7 @@ pub(super) fn nearest_header(header: &[String], required: &[String]) -> Vec<Stri
     nearest
 }
 
-/// The column with this name that a header means in other words or case, with its unit or else that of SI.
+/// Column that a header names by a synonym or in another case, with the unit of the header or the SI unit.
 fn respelled(found: &str, name: &str) -> Option<String> {
     let found = found.to_lowercase();
     let words = WORDS.into_iter().filter(|(known, _)| *known == name).map(|(_, word)| word);

@@ -387,7 +387,8 @@ codes! {
     PayloadChanged = 135, Stop,
         absolute("change", "kg", "is outside", "limits.payload_change_kg:"),
         "payload changed",
-        "look for a payload that fell off or was added, then clear; legs that had just turned around: state their friction ([actuator] coulomb_friction_n, friction_uncertainty_n); limits.payload_change_kg";
+        "look for a payload that fell off or was added, then clear; legs that had just turned around: \
+         state their friction ([actuator] coulomb_friction_n, friction_uncertainty_n); limits.payload_change_kg";
     /// Something struck the platform.
     Impact = 136, Stop,
         absolute("sudden disturbance", "m/s^2", "exceeds", "limits.disturbance_step_m_s2"),
@@ -402,7 +403,8 @@ codes! {
     VelocityError = 122, Brake,
         ratio("the velocity error", "the limit control.following_velocity_*"),
         "velocity error too large",
-        "check for a collision, a drive without force, a payload; after a leg turned around, friction ([actuator] coulomb_friction_n); control.following_velocity_*";
+        "check for a collision, a drive without force, a payload; after a leg turned around, \
+         friction ([actuator] coulomb_friction_n); control.following_velocity_*";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a
     /// sensor is wrong.
     FeedbackSaturated = 123, Brake,
