@@ -26,6 +26,7 @@ mod poses;
 mod replay;
 mod ride;
 mod setpoints;
+mod sources;
 mod stamp_clock;
 mod stamps;
 mod targets;

@@ -8,6 +8,7 @@ use crate::common;
 mod forward;
 mod inverse;
 mod refusals;
+mod tables;
 mod unsolved;
 
 use std::fs;

@@ -17,10 +17,13 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 
-/// Distance \[m\] and angle \[rad\] at which a target counts as reached: finer than people set a pose.
+/// Distance \[m\] and angle \[rad\] at which the reference has reached a target: finer than people set a pose.
 pub const REACHED_M: f64 = 1e-5;
 /// See [`REACHED_M`].
 pub const REACHED_RAD: f64 = 1e-5;
+
+/// Where the way is short, the share of it at which the reference has reached the target.
+const REACHED_SHARE: f64 = 0.01;
 
 /// Time in which the distance must shrink by these shares of itself or of what the limits of velocity allow \[s\]; else a
 /// bound is in the way. Every motion within sensible limits begins faster; along a bound it would creep for minutes.
@@ -230,7 +233,7 @@ pub fn target_motion(
     let (mut nearest_yet, mut progress_ns, mut stopped_by) = (whole, 0, LimitSet::default());
     let mut left = whole;
     let at_velocity = speed * slow_progress(constants);
-    while left > 1.0 {
+    while left > (REACHED_SHARE * whole).min(1.0) {
         let before = *reference.motion();
         let end_ns = reference.time_ns() + period_ns;
         reference.advance(constants, end_ns, Some(&Target::Pose { pose: to, speed_share: speed }));

@@ -12,13 +12,17 @@ use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
 use super::target::pose_options::PoseOptions;
 use super::target::{
-    TargetError, TargetSource, constants, has_received, is_reached, pose_of, reference_x, target_x,
+    Deviation, TargetError, TargetSource, constants, has_received, is_reached, pose_of, reference_x, target_x,
 };
-use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetMotion, target_motion};
+use crate::analysis::target_motion::{TargetMotion, target_motion};
 use crate::config::Config;
 use crate::control::constants::Constants;
 use crate::control::signals::limits::Limit;
+use crate::control::supervision::in_position::{InPosition, InPositionWindow};
+use crate::daemon::nanoseconds;
 use crate::model::LEGS;
+use crate::model::rigid::Twist;
+use crate::operator::protocol::AnswerLine;
 use crate::operator::requests::status;
 use crate::output::files::print;
 use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, percent, significant};
@@ -43,6 +47,9 @@ pub struct GotoArguments {
     /// Share of the limits of autonomous motions, for example 50%
     #[arg(long, value_name = "SHARE", default_value = "100%", value_parser = speed)]
     speed: f64,
+    /// Distance from the target at which the platform has arrived [m], instead of in_position.tolerance_m; the angle in proportion
+    #[arg(long, value_name = "M", value_parser = tolerance)]
+    tolerance: Option<f64>,
     /// Compute the way and its duration; move nothing. Without a daemon it begins at home
     #[arg(long)]
     dry_run: bool,
@@ -69,9 +76,11 @@ impl GotoArguments {
         let to = self.target.applied_to(base, self.relative);
         let motion = target_motion(&constants, &pose_of(&from), &pose_of(&to), self.speed, |_, _| ())
             .map_err(TargetError::Refused)?;
+        let window = self.window(&config);
         if self.dry_run {
             return Ok(print(Plan {
                 constants: &constants,
+                window: &window,
                 from: &from,
                 origin,
                 to: &to,
@@ -84,7 +93,15 @@ impl GotoArguments {
         let within = self.engage.then(|| Duration::from_secs_f64(self.within));
         let mut source = TargetSource::open(&config, within, &stop)?;
         source.set_speed(self.speed);
-        Ok(drive(source, &constants, [from, to], motion.duration_s, &stop)?)
+        Ok(drive(source, &constants, [from, to], &window, motion.duration_s, &stop)?)
+    }
+
+    /// When the platform counts as arrived.
+    fn window(&self, config: &Config) -> InPositionWindow {
+        let InPositionWindow { tolerance_m, tolerance_rad, settling_ns } = config.deployment.in_position;
+        let wanted_m = self.tolerance.unwrap_or(tolerance_m);
+        let tolerance_rad = tolerance_rad * wanted_m / tolerance_m;
+        InPositionWindow { tolerance_m: wanted_m, tolerance_rad, settling_ns }
     }
 
     /// X at the beginning of the motion, X to which coordinates are added, which is the target that is held if there is
@@ -104,17 +121,18 @@ impl GotoArguments {
     }
 }
 
-/// Publishes the target until the reference has reached it; after a signal, until the platform is at rest.
+/// Publishes the target until the platform is in position; after a signal, until the reference is at rest.
 /// Control begins at the pose of the platform.
 fn drive(
     mut source: TargetSource,
     constants: &Constants,
     [from, to]: [[f64; 6]; 2],
+    window: &InPositionWindow,
     duration_s: f64,
     stop: &Stop,
 ) -> Result<(), TargetError> {
     let longest_s = LONGEST_SHARE * duration_s + LONGEST_EXTRA_S;
-    let mut resting = None;
+    let (mut resting, mut arrival) = (None, InPosition::default());
     loop {
         if stop.is_repeated() {
             return Err(TargetError::Interrupted);
@@ -134,26 +152,47 @@ fn drive(
         source.publish(x)?;
         let elapsed_s = since.elapsed().as_secs_f64();
         if elapsed_s > longest_s {
-            return Err(TargetError::TimedOut(longest_s));
+            return Err(too_late(&source, &x, window, longest_s));
         }
         // An older status would have another pose, or another target if the way is short.
         let (requested, answer) = source.status().newest;
         if requested < since || !has_received(&answer, &x) {
             continue;
         }
-        if is_reached(&source.present_x()?, &x) {
-            return if resting.is_some() { Err(TargetError::Interrupted) } else { reached(&source, since) };
+        if resting.is_some() && is_reached(&source.present_x()?, &x) {
+            return Err(TargetError::Interrupted);
+        }
+        let error = error_to(&answer, &x);
+        let requested_ns = nanoseconds(requested.duration_since(since).as_secs_f64());
+        if resting.is_none() && arrival.update(window, requested_ns, &x, error.as_ref()) {
+            return arrived(&source, since, error.unwrap_or_default());
         }
     }
 }
 
+/// The target minus the measured pose; `None` if it is unknown.
+fn error_to(answer: &AnswerLine, x: &[f64; 6]) -> Option<Twist> {
+    let pose = answer.status.as_ref()?.pose?;
+    Some(pose_of(&pose).displacement_to(&pose_of(x)))
+}
+
+/// The error of a target that was not reached in time.
+fn too_late(source: &TargetSource, x: &[f64; 6], window: &InPositionWindow, longest_s: f64) -> TargetError {
+    let error = error_to(&source.status().newest.1, x);
+    match error.filter(|_| source.present_x().is_ok_and(|present| is_reached(&present, x))) {
+        Some(error) => TargetError::NotInPosition(longest_s, Deviation(error), *window),
+        None => TargetError::TimedOut(longest_s),
+    }
+}
+
 /// Reports the pose of the platform.
-fn reached(source: &TargetSource, since: Instant) -> Result<(), TargetError> {
+fn arrived(source: &TargetSource, since: Instant, error: Twist) -> Result<(), TargetError> {
     let (elapsed_s, answer) = (since.elapsed().as_secs_f64(), source.status().newest.1);
     let report = answer.status.unwrap_or_default();
     let (pose, [shortest, longest]) = (report.pose.unwrap_or_default(), report.stroke_m);
     let text = format!(
-        "reached after {elapsed_s:.2} s; the platform stands under control\n{}{}",
+        "in position after {elapsed_s:.2} s, {} from the target; the platform stands under control\n{}{}",
+        Deviation(error),
         heading(),
         row("pose", &pose, motion_digits(longest - shortest))
     );
@@ -170,8 +209,14 @@ fn speed(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Tolerance \[m\].
+fn tolerance(text: &str) -> Result<f64, String> {
+    number_within(text, 1e-9..=0.1, " m")
+}
+
 /// Planned motion of the reference.
 struct Plan<'a> {
+    window: &'a InPositionWindow,
     constants: &'a Constants,
     from: &'a [f64; 6],
     origin: &'static str,
@@ -182,7 +227,7 @@ struct Plan<'a> {
 
 impl fmt::Display for Plan<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { constants, from, origin, to, speed, motion } = self;
+        let Self { constants, window, from, origin, to, speed, motion } = self;
         let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
         let digits = motion_digits(actuator.stroke());
@@ -190,10 +235,11 @@ impl fmt::Display for Plan<'_> {
         writeln!(f, "{}{rows}from is {origin}", heading())?;
         writeln!(
             f,
-            "duration  {:.3} s, to within {} mm and {} mrad",
+            "duration  {:.3} s, then {:.3} s in position within {} mm and {} mrad",
             motion.duration_s,
-            1e3 * REACHED_M,
-            1e3 * REACHED_RAD
+            window.settling_ns as f64 * 1e-9,
+            significant(1e3 * window.tolerance_m),
+            significant(1e3 * window.tolerance_rad)
         )?;
         writeln!(
             f,
@@ -217,7 +263,10 @@ impl fmt::Display for Plan<'_> {
         let shares = Limit::ALL.into_iter().zip(motion.limited_shares).filter(|(_, share)| *share > 0.0);
         let limits: Vec<_> =
             shares.map(|(limit, share)| format!("{} {}", limit.name(), percent(share))).collect();
-        let limits = if limits.is_empty() { "nothing".into() } else { limits.join(", ") };
+        let limits = limits.join(", ");
+        if limits.is_empty() {
+            return writeln!(f, "limited by the rate of the loop alone, because the way is short");
+        }
         writeln!(
             f,
             "limited by {limits} of the time, with {} of [limits] (limits.scale, limits.autonomous_scale and --speed)",

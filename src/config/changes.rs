@@ -12,7 +12,8 @@ use crate::output::excerpt::excerpt;
 /// Sections that a running daemon can reload. All others need a restart: geometry, masses and actuators
 /// belong to the machine, `realtime` to the threads, `operator` to the control socket, and the name to the
 /// topics.
-const RELOADABLE: [&str; 7] = ["control", "drive", "envelope", "limits", "measured", "setpoint", "timeouts"];
+const RELOADABLE: [&str; 8] =
+    ["control", "drive", "envelope", "in_position", "limits", "measured", "setpoint", "timeouts"];
 
 /// Sections that the daemon does not read.
 const FOREIGN: [&str; 1] = ["plant"];

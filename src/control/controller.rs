@@ -180,7 +180,8 @@ impl Controller {
             may_be_frozen: errors.may_be_frozen(),
         };
         let request = supervisor.new_request(input);
-        let findings = assess(&cycle, &evidence, localization, reference, &mut active_limits);
+        let near_since_ns = &mut supervisor.near_since_ns;
+        let findings = assess(&cycle, &evidence, localization, reference, &mut active_limits, near_since_ns);
         let next = supervisor.decide(request, &findings, constants.parameters.after_loss);
         if request.is_some_and(|new| new.request == Request::Clear) {
             localization.clear_assembly_mode_fault(&constants.home);

@@ -41,6 +41,8 @@ pub struct Parameters {
     pub force_rate: f64,
     /// Reaction to a setpoint that the limits do not allow to follow.
     pub on_violation: ViolationPolicy,
+    /// Whether control may begin beyond the engage tolerance of a setpoint in motion.
+    pub approach: bool,
     /// Acceleration that feedback may add to the limits, as a ratio of them.
     pub feedback_scale: f64,
     /// Change of the payload under control that is no fault \[kg\]; `None` means the default of the machine.

@@ -24,7 +24,7 @@ use crate::control::controller::Output;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::{Input, Publishers};
 use crate::control::signals::state::State;
-use crate::messages::Statistics;
+use crate::messages::StatisticsMessage;
 use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
@@ -42,8 +42,8 @@ pub struct LogLinks<'a, 'o> {
     pub records: Consumer<'a, CycleRecord>,
     /// Delays from release to force sent \[ns\], from the I/O thread.
     pub delays: Consumer<'a, u64>,
-    /// Statistics for the status message.
-    pub statistics: Writer<Statistics>,
+    /// Statistics, to the I/O thread.
+    pub statistics: Writer<StatisticsMessage>,
     /// Kernel files of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
     /// Queue to the recorder. If it is full, cycles are lost, unless this thread may hold the loop.
@@ -61,7 +61,7 @@ pub struct LogLinks<'a, 'o> {
 /// Statistics of a run.
 #[derive(Debug, Default)]
 pub struct LogReport {
-    pub statistics: Statistics,
+    pub statistics: StatisticsMessage,
     pub counts_csv: String,
     pub tracking: TrackingSum,
     pub faults: Vec<Fault>,

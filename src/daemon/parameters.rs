@@ -66,6 +66,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         after_loss: control.on_setpoint_lost,
         lost_park_ns: nanoseconds(control.lost_park_s),
         on_violation: deployment.setpoint.on_violation,
+        approach: deployment.setpoint.approach,
         // A ratio of the scaled limits.
         feedback_scale: limits.feedback_scale / limits.scale,
         payload_change_kg: limits.payload_change_kg,

@@ -9,7 +9,7 @@ use super::io_thread::IoReport;
 use super::log_thread::LogReport;
 use super::recorder::RecorderReport;
 use crate::config::Config;
-use crate::messages::{Statistics, Times, WorstCycle};
+use crate::messages::{StatisticsMessage, Times, WorstCycle};
 use crate::output::files::{FileError, write_whole};
 use crate::output::version::VERSION;
 use crate::realtime::cyclic::LoopReport;
@@ -95,7 +95,7 @@ impl Report {
     pub(super) fn new(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Self {
         warn_of_losses(cyclic, io);
         let counters = &cyclic.counters;
-        let Statistics { total, worst, .. } = log.statistics;
+        let StatisticsMessage { total, worst, .. } = log.statistics;
         let report = Self {
             version: VERSION.into(),
             cycles: counters.cycles,

@@ -2,7 +2,7 @@
 
 use crate::control::signals::diagnostic::Diagnostic;
 use crate::control::signals::inputs::{Measurement, Publishers, Setpoint};
-use crate::messages::{Rejection, StatusMessage};
+use crate::messages::{LoopTimes, Rejection, StatusMessage};
 use crate::model::LEGS;
 
 /// Newest published cycle, with its inputs.
@@ -10,6 +10,8 @@ use crate::model::LEGS;
 pub struct Snapshot {
     /// Status of the cycle, without header.
     pub status: StatusMessage,
+    /// Times of the last complete second.
+    pub window: LoopTimes,
     /// Forces \[N\]; zero unless the state has control.
     pub force: [f64; LEGS],
     /// CLOCK_MONOTONIC instant at which it was published \[ns\]; 0 before the first cycle.

@@ -4,7 +4,7 @@
 use super::cycle::{CycleRecord, measured_age_ns};
 use super::hints::Hints;
 use super::time_histogram::TimeHistogram;
-use crate::messages::{LoopTimes, Statistics, WORST_CYCLES, WorstCycle};
+use crate::messages::{LoopTimes, StatisticsMessage, WORST_CYCLES, WorstCycle};
 
 /// Histograms of one interval.
 #[derive(Debug, Default)]
@@ -82,15 +82,16 @@ impl Collector {
     }
 
     /// Ends the window and returns the statistics so far.
-    pub fn end_window(&mut self) -> Statistics {
+    pub fn end_window(&mut self) -> StatisticsMessage {
         let statistics = self.statistics();
         self.window.clear();
         statistics
     }
 
     /// The statistics so far.
-    pub fn statistics(&self) -> Statistics {
-        Statistics { window: self.window.times(), total: self.total.times(), worst: self.worst }
+    pub fn statistics(&self) -> StatisticsMessage {
+        let (window, total) = (self.window.times(), self.total.times());
+        StatisticsMessage { window, total, worst: self.worst, ..StatisticsMessage::default() }
     }
 
     /// `time,ns,count`: how often each time occurred since start. Allocates.

@@ -23,7 +23,7 @@ use super::memory_queue::{MemoryProducer, MemoryQueue};
 use super::parameters::{nanoseconds, timing};
 use super::recorder::{Folders, Recorder, RecorderReport};
 use super::reload::handover::{Handover, Offer, OfferQueue};
-use super::reload::timeouts::MessageTimeouts;
+use super::reload::io_parameters::IoParametersInForce;
 use super::reload::{self, Loaded, ReloadLinks, Requester};
 use super::report::Report;
 use super::snapshot::Snapshot;
@@ -37,7 +37,7 @@ use crate::config::Config;
 use crate::control::controller::{Controller, Output};
 use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::inputs::Input;
-use crate::messages::Statistics;
+use crate::messages::StatisticsMessage;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, LoopReport, RECORDS, ReleaseMode};
 use crate::realtime::event::Event;
@@ -87,8 +87,8 @@ pub(super) fn run(
     word: &'static RequestWord,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
-    let (timeouts, loaded) = (MessageTimeouts::new(loaded.timeouts()), Arc::new(loaded));
-    let (config, controller, timeouts) = (&loaded.config, loaded.controller.clone(), &timeouts);
+    let (io_parameters, loaded) = (&IoParametersInForce::new(&loaded.io_parameters()), Arc::new(loaded));
+    let (config, controller) = (&loaded.config, loaded.controller.clone());
     let mut memory_queue = Box::new(MemoryQueue::new());
     let (memory_producer, memories) = memory_queue.split();
     let (recorder, recorder_links) = Recorder::new(&loaded, memories, folders);
@@ -103,7 +103,7 @@ pub(super) fn run(
     let (record_producer, records) = record_queue.split();
     let mut delay_queue = Box::new(Queue::<u64, DELAYS>::new());
     let (delay_producer, delays) = delay_queue.split();
-    let (statistics_writer, statistics) = triple_buffer(Statistics::default());
+    let (statistics_writer, statistics) = triple_buffer(StatisticsMessage::default());
     let (snapshot_writer, snapshots) = triple_buffer(Snapshot::default());
     let (latch, latch_link) = latch
         .map(|latch| {
@@ -132,7 +132,7 @@ pub(super) fn run(
         records: record_producer,
         memories: MemoryProducer::new(memory_producer),
         word,
-        handover: Handover::new(offers, answer_producer, timeouts),
+        handover: Handover::new(offers, answer_producer, io_parameters),
         progress,
         files,
         ready: io_ready.clone(),
@@ -145,7 +145,7 @@ pub(super) fn run(
         snapshots: snapshot_writer,
         latch: latch_link,
         word,
-        timeouts,
+        parameters: io_parameters,
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
         passed_on: &flags.passed_on,
@@ -271,7 +271,7 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let Config { machine, deployment, .. } = config;
     let realtime = &deployment.realtime;
     // Ports belong to the thread that opens them, so they are opened here.
-    let ports = config.join().and_then(|bus| Ports::open(&bus, links.timeouts.get()));
+    let ports = config.join().and_then(|bus| Ports::open(&bus, &links.parameters.get()));
     let (ports, opened) = ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
     let shortfalls = opened.map(|()| if realtime.is_simulated() { vec![] } else { prepare_io(realtime) });
     // There is no receiver only if another thread failed first.

@@ -12,7 +12,7 @@
 //! | | |
 //! | --- | --- |
 //! | iceoryx2 | 0.9.3 exactly, publish-subscribe, IPC service, no user header |
-//! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
+//! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status`, `statistics` |
 //! | type name | `hexad_<last part>` |
 //! | opening a service | open or create: the first participant sets the settings for all |
 //! | settings, ports | `max_publishers` 4, of `command` 16; `max_subscribers` 16; `max_nodes` 32 |
@@ -79,7 +79,7 @@ pub use self::rejection::Rejection;
 pub use self::remains::Remains;
 pub use self::setpoint::SetpointMessage;
 pub use self::statistics::{
-    IoCounters, LoopCounters, LoopTimes, RejectionCounts, Statistics, Times, WORST_CYCLES, WorstCycle,
+    IoCounters, LoopCounters, LoopTimes, RejectionCounts, StatisticsMessage, Times, WORST_CYCLES, WorstCycle,
 };
 pub use self::status::{DiagnosticRecord, StatusMessage};
 pub use self::subscriber::{LeasedSubscriber, Subscriber};
@@ -87,12 +87,13 @@ pub use self::subscriber::{LeasedSubscriber, Subscriber};
 use self::layout::{Declared, Layout};
 
 /// Layouts of all messages.
-pub const MESSAGES: [&Layout; 5] = [
+pub const MESSAGES: [&Layout; 6] = [
     &SetpointMessage::LAYOUT,
     &MeasuredMessage::LAYOUT,
     &CommandMessage::LAYOUT,
     &ForceMessage::LAYOUT,
     &StatusMessage::LAYOUT,
+    &StatisticsMessage::LAYOUT,
 ];
 
 /// A struct that is published on a topic of its own.

@@ -1,4 +1,4 @@
-//! Timing and counters of the loop, parts of the status message.
+//! Timing of the loop, a message of its own, and its counters, parts of the status message.
 
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -59,8 +59,10 @@ message! {
 }
 
 message! {
-    /// Statistics of the loop, renewed every second.
-    Statistics = "hexad_statistics" {
+    /// Timing of the loop, published every second.
+    StatisticsMessage = "hexad_statistics" on "statistics" schema 1 {
+        /// Schema version, publisher, sequence number and time stamp.
+        header: super::Header,
         /// The last complete second.
         window: LoopTimes,
         /// Since start.

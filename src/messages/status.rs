@@ -3,10 +3,12 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use super::{IoCounters, LoopCounters, Statistics};
+use super::{IoCounters, LoopCounters};
 use crate::control::controller::Output;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Setpoint;
 use crate::control::signals::state::State;
+use crate::model::rigid::Twist;
 use crate::model::task::task_coordinates;
 
 message! {
@@ -25,7 +27,7 @@ message! {
 
 message! {
     /// State of the daemon, published every cycle.
-    StatusMessage = "hexad_status" on "status" schema 6 {
+    StatusMessage = "hexad_status" on "status" schema 7 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// Number of the `State`.
@@ -68,8 +70,17 @@ message! {
         counters: LoopCounters,
         /// Counters of the I/O thread.
         io: IoCounters,
-        /// Timing of the loop.
-        statistics: Statistics,
+        /// 1 while the platform follows a setpoint that does not change, and has been within the tolerance of it for the settling
+        /// time (`[in_position]`).
+        in_position: u32,
+        /// 1 if `setpoint_position_error_m` and `setpoint_orientation_error_rad` are valid.
+        setpoint_error_valid: u32,
+        /// C of the setpoint minus C.
+        setpoint_position_error_m: [f64; 3] ["m"],
+        /// log(R_setpoint R^T).
+        setpoint_orientation_error_rad: [f64; 3] ["rad"],
+        /// `limits.scale` in force.
+        limits_scale: f64,
     }
 }
 
@@ -88,8 +99,8 @@ impl From<Diagnostic> for DiagnosticRecord {
 }
 
 impl StatusMessage {
-    /// Status of a cycle, without counters and statistics. `home` is the origin of the angles of X.
-    pub fn new(home: &[f64; 6], output: &Output) -> Self {
+    /// Status of a cycle, without counters, `in_position` and `limits_scale`. `home` is the origin of the angles of X.
+    pub fn new(home: &[f64; 6], output: &Output, setpoint: Option<&Setpoint>) -> Self {
         let mut message = Self {
             state: output.state as u32,
             active_limits: output.active_limits.0,
@@ -114,7 +125,20 @@ impl StatusMessage {
             message.position_error_m = error.pose.linear.into();
             message.orientation_error_rad = error.pose.angular.into();
         }
+        let setpoint = setpoint.filter(|setpoint| setpoint.task.is_finite());
+        if let Some((platform, setpoint)) = output.platform.as_ref().zip(setpoint) {
+            let error = platform.pose.displacement_to(&setpoint.task.motion().pose);
+            message.setpoint_error_valid = 1;
+            message.setpoint_position_error_m = error.linear.into();
+            message.setpoint_orientation_error_rad = error.angular.into();
+        }
         message
+    }
+
+    /// Pose of the newest setpoint minus the measured pose; `None` if one of them is unknown.
+    pub fn setpoint_error(&self) -> Option<Twist> {
+        let Self { setpoint_orientation_error_rad: angular, setpoint_position_error_m: linear, .. } = *self;
+        (self.setpoint_error_valid == 1).then(|| Twist { angular: angular.into(), linear: linear.into() })
     }
 
     /// State of the daemon; `None` if no state has its number.
@@ -129,7 +153,7 @@ mod tests {
     use crate::control::sensing::localization::PlatformState;
     use crate::control::signals::errors::PoseError;
     use crate::control::signals::limits::LimitSet;
-    use crate::model::rigid::{Twist, Wrench};
+    use crate::model::rigid::Wrench;
     use crate::model::task::TaskState;
     use nalgebra::Vector6;
 
@@ -165,7 +189,8 @@ mod tests {
 
     #[test]
     fn a_status_contains_the_numbers_of_the_output() {
-        let message = StatusMessage::new(&HOME, &output());
+        let setpoint = Setpoint::motion(1, TaskState::at_rest(six(0.0)));
+        let message = StatusMessage::new(&HOME, &output(), Some(&setpoint));
         assert_eq!([message.state, message.active_limits], [State::Active as u32, 6]);
         let diagnostic = DiagnosticRecord { code: 4, index: 3, value: 1.0, bound: 2.0 };
         assert_eq!(message.diagnostic, diagnostic);
@@ -179,13 +204,23 @@ mod tests {
         assert_eq!([message.missed_measurements, message.missed_setpoints], [7, 8]);
         assert_eq!([message.condition, message.time_to_singularity_s], [50.0, 51.0]);
         assert_eq!([message.wrench_error, message.twist], [six(20.0), six(30.0)]);
-        assert_eq!([message.pose_valid, message.error_valid], [1, 1]);
+        assert_eq!([message.pose_valid, message.error_valid, message.setpoint_error_valid], [1; 3]);
+        let error: [f64; 3] = core::array::from_fn(|k| six(0.0)[3 + k] - HOME[3 + k]);
+        assert!(message.setpoint_position_error_m.iter().zip(error).all(|(a, b)| (a - b).abs() < 1e-12));
         assert!(message.x.iter().zip(HOME).all(|(x, home)| (x - home).abs() < 1e-12), "{:?}", message.x);
         assert_eq!(
             [message.orientation_error_rad, message.position_error_m],
             [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]]
         );
-        let unknown = StatusMessage::new(&HOME, &Output::default());
-        assert_eq!([unknown.pose_valid, unknown.error_valid], [0, 0]);
+        let unknown = StatusMessage::new(&HOME, &Output::default(), Some(&setpoint));
+        assert_eq!([unknown.pose_valid, unknown.error_valid, unknown.setpoint_error_valid], [0; 3]);
+        let unknown = StatusMessage::new(&HOME, &output(), None);
+        assert_eq!((unknown.setpoint_error_valid, unknown.setpoint_error()), (0, None));
+    }
+
+    /// A monitor in another language reads one status per cycle.
+    #[test]
+    fn a_status_has_less_than_1_kb() {
+        assert!(size_of::<StatusMessage>() < 1000, "{}", size_of::<StatusMessage>());
     }
 }

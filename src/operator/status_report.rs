@@ -33,6 +33,11 @@ pub struct StatusReport {
     /// X of the target that is followed or held; `None` if the newest setpoint is no target, or without control.
     #[serde(default)]
     pub target: Option<[f64; 6]>,
+    /// Whether the platform is in position; `None` if the daemon is older than this field.
+    pub in_position: Option<bool>,
+    /// Distance \[m\] and angle \[rad\] from the pose to the newest setpoint; `None` if one of them is unknown.
+    #[serde(default)]
+    pub setpoint_distance: Option<[f64; 2]>,
     /// Reference minus measured under control, else setpoint minus measured \[m\].
     pub position_error_m: Option<[f64; 3]>,
     /// The same of the orientation \[rad\].

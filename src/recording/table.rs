@@ -32,6 +32,9 @@ pub fn write_csv(recording: &Recording, home: &[f64; 6], path: &Path) -> Result<
 /// Columns about the timing of a cycle; `t` \[s\].
 const TIMING: [&str; 6] = ["cycle", "t", "wakeup_ns", "compute_ns", "setpoint_age_s", "measured_age_s"];
 
+/// Fields of the status that a recorded cycle does not have.
+const NOT_PER_CYCLE: [&str; 5] = ["header", "counters", "io", "in_position", "limits_scale"];
+
 /// Columns of the table: the timing, then the fields of the messages.
 struct Columns {
     setpoint: Section,
@@ -47,7 +50,7 @@ impl Columns {
         Self {
             setpoint: Section::new(&SetpointMessage::LAYOUT, "setpoint_", &["header"]),
             measured: Section::new(&MeasuredMessage::LAYOUT, "measured_", &input),
-            status: Section::new(&StatusMessage::LAYOUT, "", &["header", "counters", "io", "statistics"]),
+            status: Section::new(&StatusMessage::LAYOUT, "", &NOT_PER_CYCLE),
             force: Section::new(
                 &ForceMessage::LAYOUT,
                 "",
@@ -82,7 +85,8 @@ impl Columns {
         let measured = input.measurement.map(|it| MeasuredMessage::from(&it).numbers());
         self.setpoint.append(&mut row, setpoint.as_deref());
         self.measured.append(&mut row, measured.as_deref());
-        self.status.append(&mut row, Some(&StatusMessage::new(home, &output).numbers()));
+        self.status
+            .append(&mut row, Some(&StatusMessage::new(home, &output, input.setpoint.as_ref()).numbers()));
         self.force.append(&mut row, Some(&ForceMessage::new(&output, input.release_ns).numbers()));
         Some(row)
     }

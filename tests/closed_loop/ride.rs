@@ -84,6 +84,12 @@ impl Ride {
         [(pose.position - wanted.position).norm(), angle_between(&pose.rotation, &wanted.rotation)]
     }
 
+    /// Difference of the velocities \[m/s\] and of the angular velocities \[rad/s\].
+    pub fn velocity_error(&self, task: &TaskState) -> [f64; 2] {
+        let (twist, wanted) = (self.rig.simulator.state().twist, task.motion().twist);
+        [(twist.linear - wanted.linear).norm(), (twist.angular - wanted.angular).norm()]
+    }
+
     /// The limits of the true motion; each of velocity, acceleration and jerk at least this much used.
     pub fn assert_limits(&self, used: [f64; 3], what: &str) {
         let Largest { velocity, acceleration, jerk, leg_rate, condition, room, .. } = self.felt.largest;

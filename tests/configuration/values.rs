@@ -131,7 +131,7 @@ fn keys_are_refused_when_missing_unknown_or_of_the_wrong_shape() {
          reference_length_m",
     );
     let sections = "name, gravity_m_s2, platform, actuator, cylinder, rod, home, leg, realtime, limits, \
-                    measured, drive, control, setpoint, timeouts, operator, plant, envelope";
+                    measured, drive, control, setpoint, timeouts, in_position, operator, plant, envelope";
     let unknown =
         |key: &str, probably: &str| format!("{key}: unknown key,{probably} must be one of: {sections}");
     refused("[home]\n", "[topics]\nx = 1\n\n[home]\n", &unknown("topics", ""));

@@ -90,10 +90,10 @@ fn the_list_of_fields_is_that_of_the_structs() {
     assert_eq!((header.size, header.align), (size_of::<Header>(), align_of::<Header>()));
     let field = |layout: &Layout, name: &str| *layout.fields.iter().find(|field| field.name == name).unwrap();
     assert_eq!(field(&ForceMessage::LAYOUT, "checksum").offset, offset_of!(ForceMessage, checksum));
-    assert_eq!(field(&StatusMessage::LAYOUT, "statistics").offset, offset_of!(StatusMessage, statistics));
+    assert_eq!(field(&StatusMessage::LAYOUT, "io").offset, offset_of!(StatusMessage, io));
     let columns = StatusMessage::LAYOUT.columns("");
     assert_eq!(columns.len(), StatusMessage::default().numbers().len());
-    for name in ["header_sequence", "diagnostic_value", "x_6", "statistics_worst_8_steal_ms"] {
+    for name in ["header_sequence", "diagnostic_value", "x_6", "io_rejected_schema"] {
         assert!(columns.iter().any(|column| column == name), "{name}: {columns:?}");
     }
 }

@@ -88,7 +88,7 @@ fn pause_shortly(trio: &Trio) -> (Option<ForceMessage>, u64) {
     let_pass(Duration::from_nanos(2 * TIMEOUT_NS));
     let is_lost = |force: &&ForceMessage| force.release_ns > from_ns && force.valid == 0;
     let recording = trio.recorder.so_far();
-    (recording.forces.iter().find(is_lost).copied(), recording.longest_silence_ns(from_ns))
+    (recording.forces.iter().find(is_lost).copied(), recording.longest_silence_ns(from_ns..))
 }
 
 #[test]

@@ -170,6 +170,14 @@ fn a_player_takes_over_a_platform_that_is_held() {
     assert!(stderr.contains("the daemon is in control: moving"), "{stderr}");
     does(&machine, "stop", &[], &["standby"]);
     goes();
+    let Ended { status: code, stderr, .. } = plays(&["--hold"]);
+    assert_eq!(code.code(), Some(0), "{stderr}");
+    // Longer than any timeout after its source has left.
+    let_pass(Duration::from_secs(1));
+    assert_eq!(
+        (&status(&machine)["state"], &status(&machine)["status"]["in_position"]),
+        (&"active".into(), &true.into())
+    );
     let Ended { status: code, stderr, .. } = plays(&[]);
     assert_eq!(code.code(), Some(0), "{stderr}");
     recorder.until("the motion has ended in standby", |recording| {

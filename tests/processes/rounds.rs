@@ -173,7 +173,7 @@ fn recover(trio: &Trio, what: &str) -> (bool, usize) {
         if ended.status.success() {
             return (faults, again);
         }
-        let silent_ns = trio.recorder.so_far().longest_silence_ns(from_ns);
+        let silent_ns = trio.recorder.so_far().longest_silence_ns(from_ns..);
         println!("{what}: not engaged: {}; somebody was silent for {silent_ns} ns", ended.stderr.trim_end());
         assert!(silent_ns > STALL_NS, "{what}: from {}: {}", state.name(), ended.stderr);
         again += 1;

@@ -70,7 +70,7 @@ fn a_goto_is_refused_before_anything_moves_or_leaves_the_platform_standing() {
     let Ended { status: code, stdout, stderr } =
         goto(&machine, &["--relative", "--x-mm", "40", "--gamma-deg", "4", "--engage"]);
     assert_eq!(code.code(), Some(0), "{stderr}");
-    assert!(stdout.contains("reached after ") && stdout.contains("stands under control"), "{stdout}");
+    assert!(stdout.contains("in position after ") && stdout.contains("stands under control"), "{stdout}");
     // Longer than any timeout after its source has left.
     let_pass(Duration::from_secs(1));
     assert_eq!(status(&machine)["state"], "active");
@@ -125,6 +125,15 @@ fn relative_steps_add_up() {
     assert!((target - home - 30e-6).abs() < 1e-12, "{home} {target}");
     let z = pose(&machine)[5];
     assert!((z - target).abs() < 1e-6, "{z} is not {target}");
+    assert_eq!(status(&machine)["status"]["in_position"], true);
+    // Legs that stick do not come to within an atom.
+    let Ended { status: code, stderr, .. } =
+        goto(&machine, &["--relative", "--z-mm", "0.1", "--tolerance", "1e-9"]);
+    let words = "the reference has reached the target, but the platform was not in position";
+    assert!(
+        code.code() == Some(1) && stderr.contains(words) && stderr.contains("tolerance 1e-6 mm"),
+        "{stderr}"
+    );
     does(&machine, "stop", &[], &["standby"]);
     assert!(status(&machine)["status"]["target"].is_null(), "without control there is no target");
     daemon.stops_on("TERM", HANG);

@@ -1,9 +1,7 @@
 //! `hexad goto` before it moves: random pairs of poses, every limit, the time against the time-optimal profile, and that
 //! only targets or ways outside of the workspace are refused.
 
-use hexad::analysis::target_motion::{
-    REACHED_M, REACHED_RAD, TargetRefusal, check_target, target_motion, workspace_bounds,
-};
+use hexad::analysis::target_motion::{TargetRefusal, check_target, target_motion, workspace_bounds};
 use hexad::config::Config;
 use hexad::control::constants::Constants;
 use hexad::control::signals::limits::Limit;
@@ -206,16 +204,22 @@ fn certificate_a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
     }
 }
 
-/// Small turns and shifts, too: a target that is reached already takes no time.
+/// However short the way is, it takes time within the limits of jerk.
 #[test]
-fn a_target_that_is_reached_already_takes_no_time() {
+fn a_step_of_a_micrometre_takes_time_and_no_step_takes_none() {
     let config = Config::load(&data("motion_base", "toml")).unwrap();
     let constants = Constants::new(&config.machine, parameters(&config));
     let home = *constants.home.pose();
-    let near = home.displaced(&Twist {
-        angular: Vector3::x() * (0.4 * REACHED_RAD),
-        linear: Vector3::y() * (0.4 * REACHED_M),
-    });
-    let motion = target_motion(&constants, &home, &near, 1.0, |_, _| ()).unwrap();
-    assert_eq!(motion.duration_s, 0.0);
+    let limits = &config.deployment.limits.in_force();
+    for length in [1e-6, 5e-6, 1e-5, 1e-4] {
+        let step = Twist { angular: Vector3::zeros(), linear: Vector3::y() * length };
+        let motion = target_motion(&constants, &home, &home.displaced(&step), 1.0, |_, _| ()).unwrap();
+        // Four phases of jerk, each a quarter of the time: d = 2 J (T / 4)^3.
+        let jerk = limits.autonomous_scale * limits.position.jerk;
+        let fastest = 4.0 * (length / (2.0 * jerk)).cbrt();
+        println!("{length} m: {} s, the fastest possible {fastest} s", motion.duration_s);
+        assert!((0.8..4.0).contains(&(motion.duration_s / fastest)), "{length}: {motion:?}");
+        println!("  {:?}", motion.limited_shares);
+    }
+    assert_eq!(target_motion(&constants, &home, &home, 1.0, |_, _| ()).unwrap().duration_s, 0.0);
 }

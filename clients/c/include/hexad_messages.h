@@ -255,6 +255,64 @@ static_assert(alignof(struct hexad_io_counters) == 8, "alignment");
 static_assert(offsetof(struct hexad_io_counters, allocations) == 0, "allocations");
 static_assert(offsetof(struct hexad_io_counters, rejected) == 8, "rejected");
 
+#define HEXAD_STATUS_TOPIC "status"
+#define HEXAD_STATUS_SCHEMA 7u
+/* State of the daemon, published every cycle. */
+struct hexad_status {
+    struct hexad_header header; /* Schema version, publisher, sequence number and time stamp. */
+    uint32_t state; /* Number of the `State`. */
+    uint32_t active_limits; /* Bits of the `Limit`s that this cycle has reached, or nearly. */
+    struct hexad_diagnostic diagnostic; /* Why the state is not active, or soon will not be. */
+    uint64_t request_epoch; /* Epoch of the last command message that was carried out or refused; the largest number for a request over the control socket or by a signal. */
+    uint64_t request_sequence; /* Sequence number of that message; a number that identifies the other requests. */
+    struct hexad_diagnostic request_diagnostic; /* Why that request was refused; code 0 if it was carried out. */
+    uint32_t pose_valid; /* 1 if the fields from `x` to `time_to_singularity_s` are valid. */
+    uint32_t error_valid; /* 1 if `position_error_m` and `orientation_error_rad` are valid. */
+    double x[6]; /* Measured pose as X, by forward kinematics. [rad, m] */
+    double twist[6]; /* Measured omega, then v, base axes. [rad/s, m/s] */
+    double condition; /* Condition of that pose. */
+    double time_to_singularity_s; /* Time until a singular pose if the platform continues its motion; infinite if none is ahead. [s] */
+    double position_error_m[3]; /* C_d - C. [m] */
+    double orientation_error_rad[3]; /* log(R_d R^T). [rad] */
+    double wrench_error[6]; /* Torque about C, then force, base axes, of the actuators minus that of the control law: zero unless forces are limited. [N m, N] */
+    uint64_t missed_measurements; /* Cycles under control without a new valid measurement. */
+    uint64_t missed_setpoints; /* Cycles under control without a new valid setpoint. */
+    struct hexad_loop_counters counters; /* Counters of the real-time thread. */
+    struct hexad_io_counters io; /* Counters of the I/O thread. */
+    uint32_t in_position; /* 1 while the platform follows a setpoint that does not change, and has been within the tolerance of it for the settling time (`[in_position]`). */
+    uint32_t setpoint_error_valid; /* 1 if `setpoint_position_error_m` and `setpoint_orientation_error_rad` are valid. */
+    double setpoint_position_error_m[3]; /* C of the setpoint minus C. [m] */
+    double setpoint_orientation_error_rad[3]; /* log(R_setpoint R^T). [rad] */
+    double limits_scale; /* `limits.scale` in force. */
+};
+static_assert(sizeof(struct hexad_status) == 496, "size");
+static_assert(alignof(struct hexad_status) == 8, "alignment");
+static_assert(offsetof(struct hexad_status, header) == 0, "header");
+static_assert(offsetof(struct hexad_status, state) == 32, "state");
+static_assert(offsetof(struct hexad_status, active_limits) == 36, "active_limits");
+static_assert(offsetof(struct hexad_status, diagnostic) == 40, "diagnostic");
+static_assert(offsetof(struct hexad_status, request_epoch) == 64, "request_epoch");
+static_assert(offsetof(struct hexad_status, request_sequence) == 72, "request_sequence");
+static_assert(offsetof(struct hexad_status, request_diagnostic) == 80, "request_diagnostic");
+static_assert(offsetof(struct hexad_status, pose_valid) == 104, "pose_valid");
+static_assert(offsetof(struct hexad_status, error_valid) == 108, "error_valid");
+static_assert(offsetof(struct hexad_status, x) == 112, "x");
+static_assert(offsetof(struct hexad_status, twist) == 160, "twist");
+static_assert(offsetof(struct hexad_status, condition) == 208, "condition");
+static_assert(offsetof(struct hexad_status, time_to_singularity_s) == 216, "time_to_singularity_s");
+static_assert(offsetof(struct hexad_status, position_error_m) == 224, "position_error_m");
+static_assert(offsetof(struct hexad_status, orientation_error_rad) == 248, "orientation_error_rad");
+static_assert(offsetof(struct hexad_status, wrench_error) == 272, "wrench_error");
+static_assert(offsetof(struct hexad_status, missed_measurements) == 320, "missed_measurements");
+static_assert(offsetof(struct hexad_status, missed_setpoints) == 328, "missed_setpoints");
+static_assert(offsetof(struct hexad_status, counters) == 336, "counters");
+static_assert(offsetof(struct hexad_status, io) == 392, "io");
+static_assert(offsetof(struct hexad_status, in_position) == 432, "in_position");
+static_assert(offsetof(struct hexad_status, setpoint_error_valid) == 436, "setpoint_error_valid");
+static_assert(offsetof(struct hexad_status, setpoint_position_error_m) == 440, "setpoint_position_error_m");
+static_assert(offsetof(struct hexad_status, setpoint_orientation_error_rad) == 464, "setpoint_orientation_error_rad");
+static_assert(offsetof(struct hexad_status, limits_scale) == 488, "limits_scale");
+
 /* Distribution of a time, from a histogram of three digits. All zero where nothing was recorded. */
 struct hexad_times {
     uint64_t count; /* Number of values. */
@@ -315,66 +373,20 @@ static_assert(offsetof(struct hexad_worst_cycle, involuntary_switches) == 36, "i
 static_assert(offsetof(struct hexad_worst_cycle, page_faults) == 40, "page_faults");
 static_assert(offsetof(struct hexad_worst_cycle, steal_ms) == 44, "steal_ms");
 
-/* Statistics of the loop, renewed every second. */
+#define HEXAD_STATISTICS_TOPIC "statistics"
+#define HEXAD_STATISTICS_SCHEMA 1u
+/* Timing of the loop, published every second. */
 struct hexad_statistics {
+    struct hexad_header header; /* Schema version, publisher, sequence number and time stamp. */
     struct hexad_loop_times window; /* The last complete second. */
     struct hexad_loop_times total; /* Since start. */
     struct hexad_worst_cycle worst[8]; /* Since start, the worst first. */
 };
-static_assert(sizeof(struct hexad_statistics) == 960, "size");
+static_assert(sizeof(struct hexad_statistics) == 992, "size");
 static_assert(alignof(struct hexad_statistics) == 8, "alignment");
-static_assert(offsetof(struct hexad_statistics, window) == 0, "window");
-static_assert(offsetof(struct hexad_statistics, total) == 288, "total");
-static_assert(offsetof(struct hexad_statistics, worst) == 576, "worst");
-
-#define HEXAD_STATUS_TOPIC "status"
-#define HEXAD_STATUS_SCHEMA 6u
-/* State of the daemon, published every cycle. */
-struct hexad_status {
-    struct hexad_header header; /* Schema version, publisher, sequence number and time stamp. */
-    uint32_t state; /* Number of the `State`. */
-    uint32_t active_limits; /* Bits of the `Limit`s that this cycle has reached, or nearly. */
-    struct hexad_diagnostic diagnostic; /* Why the state is not active, or soon will not be. */
-    uint64_t request_epoch; /* Epoch of the last command message that was carried out or refused; the largest number for a request over the control socket or by a signal. */
-    uint64_t request_sequence; /* Sequence number of that message; a number that identifies the other requests. */
-    struct hexad_diagnostic request_diagnostic; /* Why that request was refused; code 0 if it was carried out. */
-    uint32_t pose_valid; /* 1 if the fields from `x` to `time_to_singularity_s` are valid. */
-    uint32_t error_valid; /* 1 if `position_error_m` and `orientation_error_rad` are valid. */
-    double x[6]; /* Measured pose as X, by forward kinematics. [rad, m] */
-    double twist[6]; /* Measured omega, then v, base axes. [rad/s, m/s] */
-    double condition; /* Condition of that pose. */
-    double time_to_singularity_s; /* Time until a singular pose if the platform continues its motion; infinite if none is ahead. [s] */
-    double position_error_m[3]; /* C_d - C. [m] */
-    double orientation_error_rad[3]; /* log(R_d R^T). [rad] */
-    double wrench_error[6]; /* Torque about C, then force, base axes, of the actuators minus that of the control law: zero unless forces are limited. [N m, N] */
-    uint64_t missed_measurements; /* Cycles under control without a new valid measurement. */
-    uint64_t missed_setpoints; /* Cycles under control without a new valid setpoint. */
-    struct hexad_loop_counters counters; /* Counters of the real-time thread. */
-    struct hexad_io_counters io; /* Counters of the I/O thread. */
-    struct hexad_statistics statistics; /* Timing of the loop. */
-};
-static_assert(sizeof(struct hexad_status) == 1392, "size");
-static_assert(alignof(struct hexad_status) == 8, "alignment");
-static_assert(offsetof(struct hexad_status, header) == 0, "header");
-static_assert(offsetof(struct hexad_status, state) == 32, "state");
-static_assert(offsetof(struct hexad_status, active_limits) == 36, "active_limits");
-static_assert(offsetof(struct hexad_status, diagnostic) == 40, "diagnostic");
-static_assert(offsetof(struct hexad_status, request_epoch) == 64, "request_epoch");
-static_assert(offsetof(struct hexad_status, request_sequence) == 72, "request_sequence");
-static_assert(offsetof(struct hexad_status, request_diagnostic) == 80, "request_diagnostic");
-static_assert(offsetof(struct hexad_status, pose_valid) == 104, "pose_valid");
-static_assert(offsetof(struct hexad_status, error_valid) == 108, "error_valid");
-static_assert(offsetof(struct hexad_status, x) == 112, "x");
-static_assert(offsetof(struct hexad_status, twist) == 160, "twist");
-static_assert(offsetof(struct hexad_status, condition) == 208, "condition");
-static_assert(offsetof(struct hexad_status, time_to_singularity_s) == 216, "time_to_singularity_s");
-static_assert(offsetof(struct hexad_status, position_error_m) == 224, "position_error_m");
-static_assert(offsetof(struct hexad_status, orientation_error_rad) == 248, "orientation_error_rad");
-static_assert(offsetof(struct hexad_status, wrench_error) == 272, "wrench_error");
-static_assert(offsetof(struct hexad_status, missed_measurements) == 320, "missed_measurements");
-static_assert(offsetof(struct hexad_status, missed_setpoints) == 328, "missed_setpoints");
-static_assert(offsetof(struct hexad_status, counters) == 336, "counters");
-static_assert(offsetof(struct hexad_status, io) == 392, "io");
-static_assert(offsetof(struct hexad_status, statistics) == 432, "statistics");
+static_assert(offsetof(struct hexad_statistics, header) == 0, "header");
+static_assert(offsetof(struct hexad_statistics, window) == 32, "window");
+static_assert(offsetof(struct hexad_statistics, total) == 320, "total");
+static_assert(offsetof(struct hexad_statistics, worst) == 608, "worst");
 
 #endif

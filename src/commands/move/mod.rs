@@ -56,6 +56,9 @@ pub struct MoveArguments {
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
+    /// At the end of the motion, leave the platform standing under control at the last pose
+    #[arg(long, conflicts_with_all = ["pause", "resume"])]
+    hold: bool,
     /// Also request control, once, as soon as the setpoints hold the pose of the platform
     #[arg(long)]
     engage: bool,
@@ -98,7 +101,7 @@ impl MoveArguments {
             }
         };
         let within = self.engage.then(|| Duration::from_secs_f64(self.within));
-        Ok(run(&config, &trajectory, within, &Stop::on_signals()?)?)
+        Ok(run(&config, &trajectory, self.hold, within, &Stop::on_signals()?)?)
     }
 }
 
@@ -156,10 +159,12 @@ impl CommandError for MoveError {
 }
 
 /// Plays the trajectory once. After the first signal of `stop` the platform comes to rest along its path;
-/// after the second the function returns at once. With `within` it also requests control.
+/// after the second the function returns at once. With `is_to_hold` the platform stands under control at the end. With
+/// `engage_within` the function also requests control.
 fn run(
     config: &Config,
     trajectory: &Trajectory,
+    is_to_hold: bool,
     engage_within: Option<Duration>,
     stop: &Stop,
 ) -> Result<(), MoveError> {
@@ -172,7 +177,7 @@ fn run(
     };
     info!(name = %config.name, seconds = trajectory.duration(), "setpoint source");
     // Every status is needed, because a state may last one cycle.
-    let playback = Playback::new(config, trajectory, bus.subscriber(usize::MAX)?, engagement);
+    let playback = Playback::new(config, trajectory, is_to_hold, bus.subscriber(usize::MAX)?, engagement);
     if bus.is_simulated() {
         run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?;
     } else {

@@ -68,6 +68,8 @@ pub(super) struct Playback<'a> {
     next_inquiry_ns: u64,
     /// Reason for waiting, as last logged.
     reason: String,
+    /// Whether the platform is to stand under control at the end of the motion.
+    is_to_hold: bool,
     /// Whether the platform is to come to rest for good, and whether until resumed.
     is_ending: bool,
     is_to_pause: bool,
@@ -77,6 +79,7 @@ impl<'a> Playback<'a> {
     pub fn new(
         config: &'a Config,
         trajectory: &'a Trajectory,
+        is_to_hold: bool,
         statuses: Subscriber<StatusMessage>,
         engagement: Engagement,
     ) -> Self {
@@ -91,6 +94,7 @@ impl<'a> Playback<'a> {
             last_active_ns: 0,
             next_inquiry_ns: 0,
             reason: String::new(),
+            is_to_hold,
             is_ending: false,
             is_to_pause: false,
         }
@@ -251,10 +255,13 @@ impl<'a> Playback<'a> {
             }
             Phase::Playing(path, since_ns) => {
                 let t = seconds(*since_ns, now_ns);
-                if path.has_ended(t) {
-                    return Ok(PlaybackStep::Finished);
+                let task = path.at(t, self.trajectory);
+                match path.has_ended(t) {
+                    true if self.is_to_hold => self.phase = Phase::Holding(task, now_ns),
+                    true => return Ok(PlaybackStep::Finished),
+                    false => {}
                 }
-                motion(path.at(t, self.trajectory))
+                motion(task)
             }
             Phase::Slowing(path, slowdown, since_ns) => {
                 let since_s = seconds(*since_ns, now_ns);

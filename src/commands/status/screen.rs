@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::control::signals::state::State;
 use crate::operator::protocol::AnswerLine;
 use crate::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
 use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, significant};
@@ -33,8 +34,8 @@ impl fmt::Display for Screen<'_> {
         writeln!(f, "{left}{right:>width$}", width = WIDTH.saturating_sub(left.chars().count()))?;
         let code = answer.diagnostic.code;
         let head = if code == 0 { String::new() } else { format!("{code} ") };
-        let text = if code == 0 { "no diagnostic" } else { &answer.diagnostic.text };
-        let lines = paragraph(&head, text, WIDTH);
+        let text = if code == 0 { progress(answer, report) } else { answer.diagnostic.text.clone() };
+        let lines = paragraph(&head, &text, WIDTH);
         for k in 0..DIAGNOSTIC_LINES {
             writeln!(f, "{}", lines.lines().nth(k).unwrap_or_default())?;
         }
@@ -48,6 +49,18 @@ impl fmt::Display for Screen<'_> {
         singularity(f, report)?;
         report.sources.iter().try_for_each(|source| writeln!(f, "{}", source_line(source)))?;
         writeln!(f, "{}", file_line(&report.configuration))
+    }
+}
+
+/// Without a diagnostic: whether the platform has arrived, and while it engages how far the setpoint is.
+fn progress(answer: &AnswerLine, report: &StatusReport) -> String {
+    match report.setpoint_distance {
+        _ if report.in_position == Some(true) => "in position".into(),
+        Some(distance) if answer.state == State::Engaging.name() => {
+            let [mm, mrad] = distance.map(|distance| significant(1e3 * distance));
+            format!("the setpoint is {mm} mm and {mrad} mrad away")
+        }
+        _ => "no diagnostic".into(),
     }
 }
 
@@ -193,6 +206,7 @@ fn age_text(age_s: f64) -> String {
 pub(in crate::commands) mod tests {
     use super::*;
     use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+    use crate::control::signals::limits::Limit;
     use crate::operator::protocol::{RequestResult, VERSION};
     use crate::operator::status_report::{ProcessReport, TimingReport};
 
@@ -222,18 +236,10 @@ pub(in crate::commands) mod tests {
                 loaded_unix_s: 0,
             },
             age_s: Some(0.0011),
+            in_position: Some(false),
+            setpoint_distance: Some([0.012_345, 0.001_234]),
             limits_scale: Some(0.123_456_789),
-            active_limits: [
-                "force",
-                "force rate",
-                "stroke",
-                "leg rate",
-                "envelope",
-                "velocity",
-                "acceleration",
-            ]
-            .map(Into::into)
-            .into(),
+            active_limits: Limit::ALL.iter().map(|limit| limit.name().into()).collect(),
             timing: TimingReport { rate_hz: 1000.0, cycles: 1_000_000_000, ..TimingReport::default() },
             pose: Some([-3.1, 3.1, -0.0, -1.2345678, 1.1, 0.0]),
             setpoint: Some([0.1; 6]),
@@ -285,6 +291,16 @@ pub(in crate::commands) mod tests {
         let leg = line("  1");
         assert_eq!((leg.matches('#').count(), leg.matches('-').count()), (13, 7 + 2), "{leg}");
         assert!(text.contains("singular pose in 0.500 s"), "{text}");
+    }
+
+    #[test]
+    fn without_a_diagnostic_it_says_how_far_the_setpoint_is() {
+        let mut answer = answer();
+        (answer.state, answer.diagnostic.code) = ("engaging".into(), 0);
+        let words = "\nthe setpoint is 12.3 mm and 1.23 mrad away\n";
+        assert!(Screen(&answer).to_string().contains(words), "{}", Screen(&answer));
+        answer.status.as_mut().unwrap().in_position = Some(true);
+        assert!(Screen(&answer).to_string().contains("\nin position\n"), "{}", Screen(&answer));
     }
 
     #[test]

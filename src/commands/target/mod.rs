@@ -4,6 +4,7 @@
 //! after its source has ended, the platform holds it under control until another source, `stop` or `park`. So
 //! a command ends when its target is reached.
 
+use core::fmt;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
@@ -20,6 +21,7 @@ use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::DerivativeLimits;
 use crate::control::signals::state::{Request, State};
+use crate::control::supervision::in_position::InPositionWindow;
 use crate::daemon::process_names::named;
 use crate::daemon::{self, nanoseconds};
 use crate::messages::clock::monotonic_ns;
@@ -31,6 +33,7 @@ use crate::operator::protocol::AnswerLine as Answer;
 use crate::operator::requests::status;
 use crate::operator::status_report::{ProcessReport, StatusReport};
 use crate::operator::{OperatorError, Order};
+use crate::output::numbers::significant;
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::stop_request::Stop;
 
@@ -69,10 +72,36 @@ pub enum TargetError {
     Ended(String, String),
     #[error("the target was not reached within {0:.1} s")]
     TimedOut(f64),
+    #[error(
+        "the reference has reached the target, but the platform was not in position within {0:.1} s: it is {1} from the target, \
+         tolerance {tolerance} (in_position.tolerance_m, tolerance_rad, or --tolerance); look for friction, noise that is not \
+         stated, and a force that holds the platform; it stands under control",
+        tolerance = Deviation::of_window(.2)
+    )]
+    NotInPosition(f64, Deviation, InPositionWindow),
     #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
     Interrupted,
     #[error("interrupted before control was taken; hexad status shows the state")]
     InterruptedEarly,
+}
+
+/// Distance and angle, for people.
+#[derive(Debug)]
+pub struct Deviation(pub Twist);
+
+impl Deviation {
+    fn of_window(window: &InPositionWindow) -> Self {
+        let [linear, angular] =
+            [window.tolerance_m, window.tolerance_rad].map(|length| Vector3::x() * length);
+        Self(Twist { angular, linear })
+    }
+}
+
+impl fmt::Display for Deviation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [mm, mrad] = [self.0.linear, self.0.angular].map(|error| significant(1e3 * error.norm()));
+        write!(f, "{mm} mm and {mrad} mrad")
+    }
 }
 
 impl CommandError for TargetError {

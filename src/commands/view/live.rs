@@ -91,9 +91,13 @@ impl<'a> Live<'a> {
             let overruns = self.counters.overruns.saturating_sub(before.overruns);
             self.history.add_counted(self.history.length_s(), late, overruns);
         }
-        self.times = status.statistics.total;
         self.add_samples(cycle);
         self.history.forget_before(self.history.length_s() - INTERVALS_S);
+    }
+
+    /// Sets the times since the start of the daemon.
+    pub fn set_times(&mut self, times: &LoopTimes) {
+        self.times = *times;
     }
 
     fn add_samples(&mut self, cycle: &CycleMessage) {

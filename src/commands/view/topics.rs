@@ -11,7 +11,8 @@ use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
 use crate::control::signals::time::seconds_between;
 use crate::messages::{
-    CycleMessage, ForceMessage, MeasuredMessage, PortError, SetpointMessage, StatusMessage, Subscriber,
+    CycleMessage, ForceMessage, MeasuredMessage, PortError, SetpointMessage, StatisticsMessage,
+    StatusMessage, Subscriber,
 };
 use crate::model::rigid::{Motion, Twist};
 use crate::model::task::TaskState;
@@ -22,12 +23,15 @@ const TOPIC_DEPTH: usize = usize::MAX;
 /// Longest time for which a setpoint counts as the reference \[s\].
 const MAX_SETPOINT_AGE_S: f64 = 0.1;
 
-/// Subscribers to the four topics of a machine.
+/// Subscribers to the topics of a machine.
 pub struct Topics {
     setpoints: Subscriber<SetpointMessage>,
     measured: Subscriber<MeasuredMessage>,
     forces: Subscriber<ForceMessage>,
     statuses: Subscriber<StatusMessage>,
+    timings: Subscriber<StatisticsMessage>,
+    /// The newest statistics.
+    pub statistics: StatisticsMessage,
     /// For each topic: the newest message that is not newer than the last cycle, and later ones.
     setpoint: Newest<SetpointMessage>,
     measurement: Newest<MeasuredMessage>,
@@ -61,6 +65,8 @@ impl Topics {
             measured: bus.subscriber(TOPIC_DEPTH)?,
             forces: bus.subscriber(TOPIC_DEPTH)?,
             statuses: bus.subscriber(TOPIC_DEPTH)?,
+            timings: bus.subscriber(1)?,
+            statistics: StatisticsMessage::default(),
             setpoint: Newest { message: None, later: VecDeque::new() },
             measurement: Newest { message: None, later: VecDeque::new() },
             pending: VecDeque::new(),
@@ -74,6 +80,7 @@ impl Topics {
         self.pending.extend(core::iter::from_fn(|| self.forces.receive()));
         self.setpoint.later.extend(core::iter::from_fn(|| self.setpoints.receive()));
         self.measurement.later.extend(core::iter::from_fn(|| self.measured.receive()));
+        self.statistics = self.timings.receive_latest().unwrap_or(self.statistics);
         let mut cycles = vec![];
         for status in statuses {
             // Both have the same time stamp.
@@ -87,7 +94,10 @@ impl Topics {
             let release_ns = force.release_ns;
             let setpoint = self.setpoint.at(release_ns, |message| message.header.time_ns);
             let measurement = self.measurement.at(release_ns, |message| message.header.time_ns);
-            cycles.push((cycle(&status, force, setpoint.as_ref(), measurement.as_ref()), status));
+            cycles.push((
+                cycle(&status, &self.statistics, force, setpoint.as_ref(), measurement.as_ref()),
+                status,
+            ));
         }
         cycles
     }
@@ -97,6 +107,7 @@ impl Topics {
 /// setpoint. Wake-up and computation are the largest of the last complete second.
 fn cycle(
     status: &StatusMessage,
+    statistics: &StatisticsMessage,
     force: &ForceMessage,
     setpoint: Option<&SetpointMessage>,
     measurement: Option<&MeasuredMessage>,
@@ -130,8 +141,8 @@ fn cycle(
     CycleMessage {
         cycle: status.counters.cycles,
         due_ns: release_ns,
-        wakeup_ns: status.statistics.window.wakeup_ns.max,
-        compute_ns: status.statistics.window.compute_ns.max,
+        wakeup_ns: statistics.window.wakeup_ns.max,
+        compute_ns: statistics.window.compute_ns.max,
         ..CycleMessage::new(&input, &output)
     }
 }

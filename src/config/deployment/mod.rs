@@ -1,5 +1,5 @@
 //! The sections of the deployment: `[realtime]`, `[control]`, `[measured]`, `[drive]`, `[limits]`, `[setpoint]`,
-//! `[timeouts]`, `[operator]`, `[plant]`, `[envelope]`.
+//! `[in_position]`, `[timeouts]`, `[operator]`, `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. Given values are checked against the limits that follow from the rate.
@@ -17,6 +17,7 @@ use super::machine::rounded;
 use super::reader::SectionReader;
 use crate::analysis::envelope;
 use crate::control::parameters::ViolationPolicy;
+use crate::control::supervision::in_position::InPositionWindow;
 use crate::model::machine::Machine;
 
 mod control;
@@ -36,6 +37,13 @@ const MIN_MEASURED_PERIODS: f64 = 1.5;
 const MAX_TIMEOUT_MS: f64 = 1000.0;
 /// Largest deceleration of the brakes \[m/s^2\]: a hundred times gravity is an impact.
 const MAX_BRAKE_DECELERATION_M_S2: f64 = 1000.0;
+/// Default of `in_position.tolerance_m`, over the noise of a length: noise alone does not exceed it.
+const IN_POSITION_PER_NOISE: f64 = 10.0;
+/// Largest tolerance \[m\], \[rad\]: a larger one is in a wrong unit.
+const MAX_IN_POSITION: f64 = 0.1;
+/// Default and largest settling time \[ms\]: a few periods of the slowest loops; longer than people wait.
+const DEFAULT_SETTLING_MS: f64 = 100.0;
+const MAX_SETTLING_MS: f64 = 10_000.0;
 /// Largest angle of an envelope \[rad\], just over half a turn; a larger one is in a wrong unit.
 const MAX_ENVELOPE_ANGLE_RAD: f64 = 3.2;
 
@@ -56,6 +64,8 @@ pub struct Deployment {
     pub timeouts: Timeouts,
     /// Treatment of setpoints.
     pub setpoint: SetpointPolicy,
+    /// When the platform counts as arrived.
+    pub in_position: InPositionWindow,
     /// Access to the control socket.
     pub operator: OperatorAccess,
     /// Simulated hardware.
@@ -69,6 +79,8 @@ pub struct Deployment {
 pub struct SetpointPolicy {
     /// Reaction to a setpoint that the limits do not allow to follow.
     pub on_violation: ViolationPolicy,
+    /// Whether control may begin beyond the engage tolerance of a source in motion.
+    pub approach: bool,
 }
 
 /// Section `[timeouts]`: largest ages of the newest messages.
@@ -96,6 +108,7 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let setpoint = setpoint(root.section("setpoint"));
     let stable_ms = |age_ms: f64| 1e3 * bounded_age_s(1e-3 * age_ms, &realtime, &control, &drive, &limits);
     let timeouts = timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation, stable_ms);
+    let in_position = in_position(root.section("in_position"), &noise, machine);
     Deployment {
         control,
         limits,
@@ -103,6 +116,7 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
         drive,
         timeouts,
         setpoint,
+        in_position,
         operator: operator::read(root.section("operator")),
         plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
@@ -113,8 +127,20 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
 fn setpoint(mut section: SectionReader) -> SetpointPolicy {
     let policies = [("stop", ViolationPolicy::Stop), ("limit", ViolationPolicy::Limit)];
     let on_violation = section.choice_or("on_violation", ViolationPolicy::Stop, &policies);
+    let approach = section.flag_or("approach", false);
     section.finish();
-    SetpointPolicy { on_violation }
+    SetpointPolicy { on_violation, approach }
+}
+
+fn in_position(mut section: SectionReader, noise: &SensorNoise, machine: &Machine) -> InPositionWindow {
+    let tolerance_m = rounded_down(IN_POSITION_PER_NOISE * noise.length_m).min(MAX_IN_POSITION);
+    let tolerance_m = section.number_or("tolerance_m", tolerance_m, Bound::UpTo(MAX_IN_POSITION));
+    let tolerance_rad = rounded_down(tolerance_m / machine.joints.radius).min(MAX_IN_POSITION);
+    let tolerance_rad = section.number_or("tolerance_rad", tolerance_rad, Bound::UpTo(MAX_IN_POSITION));
+    let longest = Bound::Within(0.0, MAX_SETTLING_MS);
+    let settling_ms = section.number_or("settling_ms", DEFAULT_SETTLING_MS, longest);
+    section.finish();
+    InPositionWindow { tolerance_m, tolerance_rad, settling_ns: (1e6 * settling_ms) as u64 }
 }
 
 fn timeouts(

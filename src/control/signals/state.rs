@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | off | not valid: brake | the pose is known: standby; after request `off`: `clear`, `engage` or `park` |
 //! | standby | not valid: brake | `engage`: engaging; `park`: stopping, then parking; the pose is lost: off |
-//! | engaging | controlled, from the measured motion onto the setpoint | on the setpoint: active; as active |
+//! | engaging | controlled, from the measured motion onto the setpoint | on the setpoint, or 1 s after it was near: active; as active |
 //! | active | controlled, on the setpoint | `stop`, `park`, setpoint ended, lost or rejected: stopping |
 //! | stopping | controlled, to rest along a verified stop | at rest: standby, parking or fault |
 //! | parking | controlled, to the home pose | at home: off; `stop`, a fault that stops: stopping |

@@ -3,7 +3,7 @@
 
 use crate::control::cycle::Cycle;
 use crate::control::law::feedback_limiter::FeedbackLimiter;
-use crate::control::parameters::Parameters;
+use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::ReferenceGenerator;
 use crate::control::sensing::localization::Localization;
 use crate::control::setpoint::target::Target;
@@ -18,6 +18,9 @@ use crate::control::supervision::supervisor::Findings;
 /// Deviation of the reference from its target at which the target counts as reached, as a ratio of the engage
 /// tolerance: near enough to a setpoint in motion, and at home almost at rest.
 const REACHED_RATIO: f64 = 0.05;
+/// Time after which a target that was within the engage tolerance counts as reached. A source whose motion needs all of a
+/// limit leaves nothing for the rest of the way; under "limit" it may even be lost again.
+const NEAR_TIME_NS: u64 = 1_000_000_000;
 const AT_HOME_RATIO: f64 = 0.005;
 
 /// Inputs of an assessment, besides the memory of the stages.
@@ -44,7 +47,8 @@ pub(in crate::control) struct Evidence<'a> {
 
 // Out of line, like `ValidatedSetpoint::target_in`: the proof on the machine code of `step` covers no jump
 // tables.
-/// Findings that decide the next state. Adds the limits that the platform is near to `active_limits`.
+/// Findings that decide the next state. Adds the limits that the platform is near to `active_limits`, and updates the
+/// instant at which the reference of an engaging platform came within the engage tolerance of its target.
 #[inline(never)]
 pub(in crate::control) fn assess(
     cycle: &Cycle<'_>,
@@ -52,6 +56,7 @@ pub(in crate::control) fn assess(
     localization: &Localization,
     reference: &ReferenceGenerator,
     active_limits: &mut LimitSet,
+    near_since_ns: &mut Option<u64>,
 ) -> Findings {
     let Evidence { setpoint, localization: located, is_ready, .. } = evidence;
     let conditioned = localization.check_condition(cycle.constants.parameters.condition, active_limits);
@@ -69,7 +74,7 @@ pub(in crate::control) fn assess(
         _ => check_engagement(cycle, evidence, &conditioned, &start),
     };
     let is_waiting = cycle.state == State::Engaging && !is_ready;
-    let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
+    let has_ended = !is_waiting && has_ended(cycle, setpoint, reference, near_since_ns);
     let sensor_may_be_frozen = evidence.may_be_frozen;
     Findings { localization: *located, start, engagement, tracking, sensor_may_be_frozen, has_ended }
 }
@@ -124,24 +129,40 @@ fn check_drives_and_external_pose(evidence: &Evidence<'_>) -> Result<(), Diagnos
 
 /// Whether the motion of the present state has ended.
 #[inline(never)]
-fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &ReferenceGenerator) -> bool {
+fn has_ended(
+    cycle: &Cycle<'_>,
+    setpoint: &ValidatedSetpoint<'_>,
+    reference: &ReferenceGenerator,
+    near_since_ns: &mut Option<u64>,
+) -> bool {
     let parameters = &cycle.constants.parameters;
-    let is_within = |target: &Target<'_>, ratio: f64| {
+    let ratio = |target: &Target<'_>| {
         let deviation = reference.offset_to(cycle.constants, target);
-        deviation.is_some_and(|deviation| parameters.engage_tolerance_ratio(&deviation) <= ratio)
+        deviation.map_or(f64::INFINITY, |deviation| parameters.engage_tolerance_ratio(&deviation))
     };
+    let since_ns = near_since_ns.take();
     match cycle.state {
-        State::Engaging => setpoint.target.as_ref().is_some_and(|target| is_within(target, REACHED_RATIO)),
+        State::Engaging => {
+            let target = setpoint.target.as_ref().filter(|_| setpoint.age_check.is_ok());
+            let Some(ratio) = target.map(ratio) else { return false };
+            let may_be_far = parameters.on_violation == ViolationPolicy::Limit && since_ns.is_some();
+            if ratio <= 1.0 || may_be_far {
+                let since_ns = *near_since_ns.insert(since_ns.unwrap_or(cycle.release_ns));
+                return ratio <= REACHED_RATIO || cycle.release_ns.saturating_sub(since_ns) >= NEAR_TIME_NS;
+            }
+            false
+        }
         State::Stopping => reference.is_at_rest(),
         State::Parking => {
-            is_within(&Target::Pose { pose: cycle.constants.home.pose(), speed_share: 1.0 }, AT_HOME_RATIO)
+            let home = Target::Pose { pose: cycle.constants.home.pose(), speed_share: 1.0 };
+            ratio(&home) <= AT_HOME_RATIO
         }
         State::Off | State::Standby | State::Active | State::Fault => false,
     }
 }
 
 /// Whether the platform is near the setpoint in pose and velocity. Otherwise closing the loop would itself
-/// move the platform. A target may be anywhere.
+/// move the platform. A target may be anywhere, and a setpoint where `setpoint.approach` permits it.
 fn check_engage_tolerance(
     parameters: &Parameters,
     setpoint: &ValidatedSetpoint<'_>,
@@ -150,7 +171,7 @@ fn check_engage_tolerance(
     let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
     let is_target = setpoint.valid.is_some_and(|valid| valid.setpoint.kind == SetpointKind::Target);
     let ratio = parameters.engage_tolerance_ratio(error);
-    if ratio <= 1.0 || is_target {
+    if ratio <= 1.0 || is_target || parameters.approach {
         return Ok(());
     }
     Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))

@@ -52,6 +52,8 @@ pub(in crate::control) struct Supervisor {
     pub answered_message: MessageId,
     /// Why that request was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
+    /// While engaging, the instant at which the reference came within the engage tolerance of its target \[ns\].
+    pub near_since_ns: Option<u64>,
 }
 
 impl Supervisor {

@@ -101,7 +101,7 @@ impl Scene {
             start,
             may_be_frozen: false,
         };
-        assess(&cycle, &evidence, &localization, &reference, &mut LimitSet::default())
+        assess(&cycle, &evidence, &localization, &reference, &mut LimitSet::default(), &mut None)
     }
 
     fn tracking(&self, state: State) -> Option<DiagnosticCode> {

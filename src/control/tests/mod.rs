@@ -101,6 +101,7 @@ pub(in crate::control) fn parameters(machine: &Machine) -> Parameters {
         fidelity: Fidelity::Exact,
         limits: LIMITS,
         limits_scale: 1.0,
+        approach: false,
         envelope: None,
         condition: 60.0,
         force_rate: 1e6,

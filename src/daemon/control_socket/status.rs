@@ -116,6 +116,10 @@ impl StatusSource {
             target: setpoint
                 .filter(|setpoint| setpoint.kind == SetpointKind::Target && follows)
                 .map(|setpoint| setpoint.task.x.into()),
+            in_position: Some(status.in_position == 1),
+            setpoint_distance: status
+                .setpoint_error()
+                .map(|error| [error.linear.norm(), error.angular.norm()]),
             position_error_m: has_error.then_some(status.position_error_m),
             orientation_error_rad: has_error.then_some(status.orientation_error_rad),
             condition: is_known.then_some(status.condition),
@@ -170,7 +174,7 @@ fn seconds(from_ns: u64, to_ns: u64) -> f64 {
 }
 
 fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
-    let (counters, window) = (&snapshot.status.counters, &snapshot.status.statistics.window);
+    let (counters, window) = (&snapshot.status.counters, &snapshot.window);
     TimingReport {
         rate_hz,
         cycles: counters.cycles,

@@ -3,7 +3,7 @@
 use crate::control::signals::inputs::{Input, Measurement, Setpoint};
 use crate::control::signals::state::{MessageId, OperatorRequest, Request};
 use crate::daemon::cycle::CycleInput;
-use crate::daemon::reload::timeouts::TimeoutsNs;
+use crate::daemon::reload::io_parameters::IoParameters;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
     Bus, CommandMessage, LeasedSubscriber, MAX_REQUEST_AGE_NS, MeasuredMessage, PortError, Rejection,
@@ -51,10 +51,10 @@ pub struct InputFilter {
 
 impl Inputs {
     /// Opens the subscribers. A publisher that is silent for longer than its timeout counts as gone.
-    pub fn open(bus: &Bus, timeouts: TimeoutsNs) -> Result<Self, PortError> {
+    pub fn open(bus: &Bus, parameters: &IoParameters) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.leased_subscriber(DEPTH, timeouts.setpoint_ns)?,
-            measured: bus.leased_subscriber(DEPTH, timeouts.measured_ns)?,
+            setpoints: bus.leased_subscriber(DEPTH, parameters.setpoint_ns)?,
+            measured: bus.leased_subscriber(DEPTH, parameters.measured_ns)?,
             commands: bus.subscriber(usize::MAX)?,
             cycle: CycleInput::default(),
             word: 0,
@@ -62,9 +62,9 @@ impl Inputs {
     }
 
     /// Changes the timeouts.
-    pub fn set_timeouts(&mut self, timeouts: TimeoutsNs) {
-        self.setpoints.set_timeout_ns(timeouts.setpoint_ns);
-        self.measured.set_timeout_ns(timeouts.measured_ns);
+    pub fn set_timeouts(&mut self, parameters: &IoParameters) {
+        self.setpoints.set_timeout_ns(parameters.setpoint_ns);
+        self.measured.set_timeout_ns(parameters.measured_ns);
     }
 
     /// The input for the next cycle.
@@ -163,7 +163,9 @@ mod tests {
     #[test]
     fn an_old_request_of_the_topic_stops_and_does_not_begin_control() {
         let bus = Bus::join(&format!("old-requests-{}", std::process::id())).unwrap();
-        let mut inputs = Inputs::open(&bus, TimeoutsNs { setpoint_ns: 1, measured_ns: 1 }).unwrap();
+        let mut inputs =
+            Inputs::open(&bus, &IoParameters { setpoint_ns: 1, measured_ns: 1, ..IoParameters::default() })
+                .unwrap();
         let mut commands = bus.publisher::<CommandMessage>().unwrap();
         let mut answered_message = MessageId::default();
         for request in Request::ALL {
@@ -191,7 +193,9 @@ mod tests {
     #[test]
     fn a_request_of_the_topic_from_before_the_word_does_not_begin_control() {
         let bus = Bus::join(&format!("overtaken-requests-{}", std::process::id())).unwrap();
-        let mut inputs = Inputs::open(&bus, TimeoutsNs { setpoint_ns: 1, measured_ns: 1 }).unwrap();
+        let mut inputs =
+            Inputs::open(&bus, &IoParameters { setpoint_ns: 1, measured_ns: 1, ..IoParameters::default() })
+                .unwrap();
         let mut commands = bus.publisher::<CommandMessage>().unwrap();
         for (word, request) in (1..).zip(Request::ALL) {
             for (later_ns, is_overtaken) in [(0, false), (1, true)] {

@@ -15,12 +15,12 @@ use self::inputs::{InputFilter, Inputs};
 use self::outputs::{OutputSettings, Outputs};
 use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
 use super::emergency_latch::LatchLink;
-use super::reload::timeouts::{MessageTimeouts, TimeoutsNs};
+use super::reload::io_parameters::{IoParameters, IoParametersInForce};
 use super::snapshot::Snapshot;
 use super::supervision::Progress;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::poll_until;
-use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, Statistics};
+use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, StatisticsMessage};
 use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
 use crate::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
 use crate::realtime::request_word::{self, RequestWord};
@@ -53,15 +53,15 @@ pub struct IoLinks<'a> {
     /// Delays from release to force sent \[ns\], to the log thread.
     pub delays: Producer<'a, u64>,
     /// Statistics, from the log thread.
-    pub statistics: Reader<Statistics>,
+    pub statistics: Reader<StatisticsMessage>,
     /// Snapshot of every cycle, to the control thread.
     pub snapshots: Writer<Snapshot>,
     /// Link to the thread of the emergency latch, if there is one.
     pub latch: Option<LatchLink>,
     /// Request word of the control thread and of signals.
     pub word: &'static RequestWord,
-    /// Timeouts, which a reload changes.
-    pub timeouts: &'a MessageTimeouts,
+    /// Parameters that a reload may change.
+    pub parameters: &'a IoParametersInForce,
     /// Set when the daemon is to end. The platform then comes to rest.
     pub is_ending: &'a AtomicBool,
     /// Progress, for the main thread.
@@ -93,8 +93,8 @@ pub struct IoReport {
 
 impl Ports {
     /// Opens all ports. They belong to the calling thread.
-    pub fn open(bus: &Bus, timeouts: TimeoutsNs) -> Result<Self, PortError> {
-        Ok(Self { inputs: Inputs::open(bus, timeouts)?, outputs: Outputs::open(bus)? })
+    pub fn open(bus: &Bus, parameters: &IoParameters) -> Result<Self, PortError> {
+        Ok(Self { inputs: Inputs::open(bus, parameters)?, outputs: Outputs::open(bus)? })
     }
 }
 
@@ -252,7 +252,7 @@ impl IoThread<'_> {
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
         (self.answered_message, self.has_control) = (output.answered_message, output.state.has_control());
-        self.inputs.set_timeouts(self.links.timeouts.get());
+        self.inputs.set_timeouts(&self.links.parameters.get());
         if let MessageId { epoch: WORD_EPOCH, sequence: word } = output.answered_message {
             (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
             self.links.word.set_seen(word);
@@ -271,17 +271,20 @@ impl IoThread<'_> {
     }
 
     fn publish(&mut self) {
-        let (home, max_force_age_ns) = (self.settings.home, self.links.timeouts.get().measured_ns);
+        let settings = OutputSettings { home: self.settings.home, parameters: self.links.parameters.get() };
         let counters = IoCounters {
             allocations: ThreadUsage::allocations_of_this_thread() - self.allocations_at_start,
             rejected: self.inputs.rejections(),
         };
         let IoLinks { exchange, statistics, delays, snapshots, progress, .. } = &mut self.links;
-        let settings = OutputSettings { home, max_force_age_ns };
         let cycle = *exchange.outputs.value();
         progress.set_output(&cycle.output);
-        let status = self.outputs.publish(&settings, cycle, counters, statistics, delays);
         let input = self.inputs.input();
+        let status = self.outputs.publish(&settings, cycle, input.setpoint.as_ref(), counters, delays);
+        if statistics.update() {
+            self.snapshot.window = statistics.value().window;
+            self.outputs.publish_statistics(*statistics.value());
+        }
         let [setpoint_rejection, measured_rejection] = self.inputs.last_rejections();
         self.snapshot = Snapshot {
             status,

@@ -1,19 +1,25 @@
-//! Outputs of the controller as messages: force and status of each cycle.
+//! Outputs of the controller as messages: force and status of each cycle, and the statistics.
 
 use heapless::spsc::Producer;
 
 use crate::control::controller::Output;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Setpoint;
 use crate::control::signals::state::State;
+use crate::control::supervision::in_position::InPosition;
 use crate::daemon::cycle::CycleOutput;
+use crate::daemon::reload::io_parameters::IoParameters;
 use crate::messages::clock::monotonic_ns;
-use crate::messages::{Bus, ForceMessage, IoCounters, PortError, Publisher, Statistics, StatusMessage};
-use crate::realtime::triple_buffer::Reader;
+use crate::messages::{
+    Bus, ForceMessage, IoCounters, PortError, Publisher, StatisticsMessage, StatusMessage,
+};
 
 /// Publishers of the daemon.
 pub struct Outputs {
     forces: Publisher<ForceMessage>,
     statuses: Publisher<StatusMessage>,
+    statistics: Publisher<StatisticsMessage>,
+    in_position: InPosition,
     is_simulated: bool,
     send_failures: u64,
 }
@@ -23,9 +29,9 @@ pub struct Outputs {
 pub struct OutputSettings {
     /// Origin of the angles of X.
     pub home: [f64; 6],
-    /// Largest age of a valid force \[ns\]. Older forces mean that the process was held between computing and
-    /// sending them: it was stopped, or the host took the processor.
-    pub max_force_age_ns: u64,
+    /// Parameters in force. `measured_ns` is also the largest age of a valid force: older ones mean that the process was
+    /// held between computing and sending them, because it was stopped or the host took the processor.
+    pub parameters: IoParameters,
 }
 
 impl Outputs {
@@ -35,6 +41,8 @@ impl Outputs {
         Ok(Self {
             forces: if is_simulated { forces.with_reproducible_epoch() } else { forces },
             statuses: bus.publisher()?,
+            statistics: bus.publisher()?,
+            in_position: InPosition::default(),
             is_simulated,
             send_failures: 0,
         })
@@ -45,23 +53,28 @@ impl Outputs {
         &mut self,
         settings: &OutputSettings,
         mut cycle: CycleOutput,
+        setpoint: Option<&Setpoint>,
         io: IoCounters,
-        statistics: &mut Reader<Statistics>,
         delays: &mut Producer<'_, u64>,
     ) -> StatusMessage {
         if !self.is_simulated {
             let now_ns = monotonic_ns();
-            invalidate_if_held(&mut cycle, now_ns, settings.max_force_age_ns);
+            invalidate_if_held(&mut cycle, now_ns, settings.parameters.measured_ns);
             self.publish_force(&cycle, now_ns, delays);
-            let status = status(settings, &cycle, io, statistics);
+            let status = self.status(settings, &cycle, setpoint, io);
             self.send_failures += u64::from(self.statuses.publish(now_ns, status).is_err());
             return status;
         }
         // The status first. A source that responds to the next measurement then has the status of this cycle.
-        let status = status(settings, &cycle, io, statistics);
+        let status = self.status(settings, &cycle, setpoint, io);
         self.send_failures += u64::from(self.statuses.publish(cycle.release_ns, status).is_err());
         self.publish_force(&cycle, cycle.release_ns, delays);
         status
+    }
+
+    /// Publishes the statistics of the last second.
+    pub fn publish_statistics(&mut self, statistics: StatisticsMessage) {
+        self.send_failures += u64::from(self.statistics.publish(monotonic_ns(), statistics).is_err());
     }
 
     /// Number of messages that could not be sent.
@@ -77,19 +90,22 @@ impl Outputs {
             let _ = delays.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }
     }
-}
 
-fn status(
-    settings: &OutputSettings,
-    cycle: &CycleOutput,
-    io: IoCounters,
-    statistics: &mut Reader<Statistics>,
-) -> StatusMessage {
-    StatusMessage {
-        counters: cycle.counters,
-        io,
-        statistics: *statistics.read(),
-        ..StatusMessage::new(&settings.home, &cycle.output)
+    fn status(
+        &mut self,
+        settings: &OutputSettings,
+        cycle: &CycleOutput,
+        setpoint: Option<&Setpoint>,
+        io: IoCounters,
+    ) -> StatusMessage {
+        let OutputSettings { home, parameters } = settings;
+        let CycleOutput { output, counters, release_ns, .. } = cycle;
+        let message = StatusMessage::new(home, output, setpoint);
+        let error = message.setpoint_error().filter(|_| output.state == State::Active);
+        let x = setpoint.map_or([f64::NAN; 6], |setpoint| setpoint.task.x.into());
+        let in_position = self.in_position.update(&parameters.in_position, *release_ns, &x, error.as_ref());
+        let limits_scale = parameters.limits_scale;
+        StatusMessage { counters: *counters, io, in_position: in_position.into(), limits_scale, ..message }
     }
 }
 
@@ -109,7 +125,6 @@ mod tests {
     use heapless::spsc::Queue;
 
     use super::*;
-    use crate::realtime::triple_buffer::triple_buffer;
 
     const DUE_NS: u64 = 7_000_000_000;
     const MAX_AGE_NS: u64 = 20_000_000;
@@ -120,15 +135,15 @@ mod tests {
         let bus = Bus::join(&format!("held-loop-{}", std::process::id())).unwrap();
         let mut outputs = Outputs::open(&bus).unwrap();
         let mut forces = bus.subscriber::<ForceMessage>(8).unwrap();
-        let (_writer, mut statistics) = triple_buffer(Statistics::default());
         let mut queue = Queue::<u64, 8>::new();
         let (mut delays, _) = queue.split();
         let output = Output { state: State::Active, force: [5.0; 6], ..Output::default() };
         for (max_force_age_ns, is_valid) in [(u64::MAX, true), (0, false)] {
-            let settings = OutputSettings { home: [0.0; 6], max_force_age_ns };
+            let parameters = IoParameters { measured_ns: max_force_age_ns, ..IoParameters::default() };
+            let settings = OutputSettings { home: [0.0; 6], parameters };
             let cycle = CycleOutput { due_ns: monotonic_ns() - 1000, output, ..CycleOutput::default() };
             let io = IoCounters::default();
-            let status = outputs.publish(&settings, cycle, io, &mut statistics, &mut delays);
+            let status = outputs.publish(&settings, cycle, None, io, &mut delays);
             let force = forces.receive_latest().unwrap();
             let (state, sent) = if is_valid { (State::Active, [5.0; 6]) } else { (State::Fault, [0.0; 6]) };
             assert_eq!((force.valid, force.force_n, status.state), (u32::from(is_valid), sent, state as u32));

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::Loaded;
-use super::timeouts::{MessageTimeouts, TimeoutsNs};
+use super::io_parameters::{IoParameters, IoParametersInForce};
 use crate::control::controller::Controller;
 use crate::control::signals::state::State;
 use crate::messages::MAX_REQUEST_AGE_NS;
@@ -29,8 +29,8 @@ pub type OfferQueue<'o> = Queue<&'o mut Offer, LENGTH>;
 pub struct Offer {
     /// Controller whose constants are exchanged.
     pub controller: Controller,
-    /// Timeouts of the same configuration.
-    pub timeouts: TimeoutsNs,
+    /// Parameters of the I/O thread, of the same configuration.
+    pub io_parameters: IoParameters,
     /// Configuration of the constants, for the recorder. The real-time thread does not use it.
     pub loaded: Arc<Loaded>,
     /// Instant of the offer \[ns\].
@@ -55,8 +55,8 @@ pub enum Answer {
 impl Offer {
     /// Offer of the configuration that is in force.
     pub fn new(loaded: Arc<Loaded>) -> Self {
-        let (controller, timeouts) = (loaded.controller.clone(), loaded.timeouts());
-        Self { controller, timeouts, loaded, offered_ns: 0, answer: Answer::None }
+        let (controller, io_parameters) = (loaded.controller.clone(), loaded.io_parameters());
+        Self { controller, io_parameters, loaded, offered_ns: 0, answer: Answer::None }
     }
 
     /// Whether all cycles before the first with the new constants have been received when `cycle` is
@@ -70,7 +70,7 @@ impl Offer {
 pub struct Handover<'q, 'o> {
     offers: Consumer<'q, &'o mut Offer>,
     answers: Producer<'q, &'o mut Offer>,
-    timeouts: &'q MessageTimeouts,
+    io_parameters: &'q IoParametersInForce,
     /// Number of the cycle.
     cycle: u64,
 }
@@ -80,9 +80,9 @@ impl<'q, 'o> Handover<'q, 'o> {
     pub fn new(
         offers: Consumer<'q, &'o mut Offer>,
         answers: Producer<'q, &'o mut Offer>,
-        timeouts: &'q MessageTimeouts,
+        io_parameters: &'q IoParametersInForce,
     ) -> Self {
-        Self { offers, answers, timeouts, cycle: 0 }
+        Self { offers, answers, io_parameters, cycle: 0 }
     }
 
     /// Accepts or refuses an offer. Call it at the beginning of each cycle, before the controller's step.
@@ -102,7 +102,7 @@ impl<'q, 'o> Handover<'q, 'o> {
             Answer::TooOld
         } else {
             controller.exchange_configuration(&mut offer.controller);
-            self.timeouts.set(offer.timeouts);
+            self.io_parameters.set(&offer.io_parameters);
             Answer::Taken(self.cycle)
         };
         // There is only one offer, so there is room.
@@ -122,7 +122,7 @@ mod tests {
         let config = Config::parse(include_str!("../../../config/fried2008.toml"), "a test").unwrap();
         let loaded = Arc::new(Loaded::new(config));
         let mut controller = loaded.controller.clone();
-        let timeouts = MessageTimeouts::new(loaded.timeouts());
+        let io_parameters = IoParametersInForce::new(&loaded.io_parameters());
         let expected = [(MAX_REQUEST_AGE_NS, Answer::Taken(1)), (MAX_REQUEST_AGE_NS + 1, Answer::TooOld)];
         for (age_ns, answer) in expected {
             let mut offer = Offer::new(loaded.clone());
@@ -130,7 +130,7 @@ mod tests {
             let (mut offers, mut answers) = (OfferQueue::new(), OfferQueue::new());
             let ((mut offered, offers), (answers, mut answered)) = (offers.split(), answers.split());
             assert!(offered.enqueue(&mut offer).is_ok());
-            Handover::new(offers, answers, &timeouts).begin_cycle(&mut controller, 1_000 + age_ns);
+            Handover::new(offers, answers, &io_parameters).begin_cycle(&mut controller, 1_000 + age_ns);
             let found = answered.dequeue().map(|offer| offer.answer);
             assert_eq!(found, Some(answer), "{age_ns} ns after the offer");
         }

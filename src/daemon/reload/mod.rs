@@ -14,7 +14,7 @@ use sha1_smol::Sha1;
 use tracing::{info, warn};
 
 use self::handover::{Answer, Offer};
-use self::timeouts::TimeoutsNs;
+use self::io_parameters::IoParameters;
 use super::parameters::{parameters, timing};
 use crate::config::changes::{Change, changes};
 use crate::config::{Config, ConfigError, fidelity};
@@ -25,7 +25,7 @@ use crate::model::fidelity::Fidelity;
 use crate::realtime::cyclic::ReleaseMode;
 
 pub mod handover;
-pub mod timeouts;
+pub mod io_parameters;
 
 /// Longest wait for the real-time thread. After it, an offer is too old to be accepted.
 const ANSWER_LIMIT: Duration = Duration::from_millis(1200);
@@ -60,9 +60,9 @@ impl Loaded {
         }
     }
 
-    /// Timeouts of the configuration.
-    pub fn timeouts(&self) -> TimeoutsNs {
-        (&self.config.deployment.timeouts).into()
+    /// Parameters of the I/O thread.
+    pub fn io_parameters(&self) -> IoParameters {
+        (&self.config.deployment).into()
     }
 }
 

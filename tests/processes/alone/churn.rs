@@ -9,9 +9,7 @@ use std::time::{Duration, Instant};
 
 use hexad::control::signals::state::State;
 use hexad::daemon::report::Report;
-use hexad::messages::LoopTimes;
-use hexad::messages::StatusMessage;
-use hexad::messages::{Bus, Subscriber};
+use hexad::messages::{Bus, StatisticsMessage, StatusMessage, Subscriber};
 
 use crate::common::certificate::Certificate;
 use crate::common::not_run::lacking;
@@ -100,9 +98,9 @@ fn median(values: &[u64]) -> u64 {
 struct Observed {
     controlled: Controlled,
     statuses: Subscriber<StatusMessage>,
+    timings: Subscriber<StatisticsMessage>,
     first: StatusMessage,
     last: StatusMessage,
-    window: LoopTimes,
     /// p99.9 of the time of a cycle, of each second.
     p999_ns: Vec<u64>,
     /// When everybody was there: minor and major faults of the io and of the log thread.
@@ -115,13 +113,14 @@ impl Observed {
         let controlled = Controlled::start(machine);
         let bus = Bus::join(&controlled.machine.name).expect("to join");
         let statuses = bus.subscriber(1).expect("to subscribe");
+        let timings = bus.subscriber(8).expect("to subscribe");
         let nothing = StatusMessage::default();
         let mut observed = Self {
             controlled,
             statuses,
             first: nothing,
             last: nothing,
-            window: LoopTimes::default(),
+            timings,
             p999_ns: vec![],
             faults: [[0; 2]; 2],
         };
@@ -139,10 +138,8 @@ impl Observed {
     fn look(&mut self) {
         let Some(status) = self.statuses.receive_latest() else { return };
         self.last = status;
-        if status.statistics.window != self.window {
-            self.window = status.statistics.window;
-            self.p999_ns.push(self.window.compute_ns.p999);
-        }
+        let news = std::iter::from_fn(|| self.timings.receive());
+        self.p999_ns.extend(news.map(|statistics| statistics.window.compute_ns.p999));
     }
 
     fn faults_now(&self) -> [[u64; 2]; 2] {

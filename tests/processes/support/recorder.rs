@@ -1,5 +1,6 @@
 //! A participant that only listens, and keeps everything.
 
+use std::ops::RangeBounds;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, mpsc};
 use std::thread::{JoinHandle, sleep, spawn};
@@ -37,14 +38,15 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Longest silence that ended after an instant, of daemon, plant or setpoint source \[ns\].
-    pub fn longest_silence_ns(&self, from_ns: u64) -> u64 {
+    /// Longest silence that ended within this time, of daemon, plant or setpoint source \[ns\].
+    pub fn longest_silence_ns(&self, within_ns: impl RangeBounds<u64>) -> u64 {
         let times: [Vec<u64>; 3] = [
             self.forces.iter().map(|message| message.header.time_ns).collect(),
             self.measured.iter().map(|message| message.header.time_ns).collect(),
             self.setpoints.iter().map(|message| message.header.time_ns).collect(),
         ];
-        let gaps = times.iter().flat_map(|times| times.windows(2)).filter(|pair| pair[1] > from_ns);
+        let gaps =
+            times.iter().flat_map(|times| times.windows(2)).filter(|pair| within_ns.contains(&pair[1]));
         gaps.map(|pair| pair[1].saturating_sub(pair[0])).max().unwrap_or(0)
     }
 }

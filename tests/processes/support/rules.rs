@@ -46,10 +46,15 @@ pub fn ends_at_rest(recording: &Recording) {
     assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
     let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
     let measured = recording.measured.iter().rfind(until_then).expect("a measurement");
-    // Held at the end of the stop, the daemon finds it over; what the plant said before is of before.
+    // Whoever was held during the stop, the platform moved on under the force of before.
+    let before = recording
+        .forces
+        .iter()
+        .rfind(|force| force.state != valid.state && force.header.time_ns < valid.header.time_ns);
     let next = recording.forces.iter().find(|force| force.header.time_ns > valid.header.time_ns);
-    let next_ns = next.expect("the last one is not valid").header.time_ns;
-    let held_ns = (next_ns - measured.header.time_ns).saturating_sub(3 * PERIOD_NS);
+    let stop_ns = before.expect("the stop began").header.time_ns
+        ..=next.expect("the last one is not valid").header.time_ns;
+    let held_ns = recording.longest_silence_ns(stop_ns).saturating_sub(3 * PERIOD_NS);
     let slowest = AT_REST + DECELERATION * (held_ns as f64 * 1e-9);
     assert!(fastest(measured) < slowest, "under the last valid force, held {held_ns} ns: {measured:#?}");
 }

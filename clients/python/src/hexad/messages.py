@@ -258,6 +258,44 @@ class IoCounters(ctypes.Structure):
         return "hexad_io_counters"
 
 
+class Status(Message):
+    """State of the daemon, published every cycle."""
+
+    topic = "status"
+    schema = 7
+    _fields_ = [
+        ("header", Header),  # Schema version, publisher, sequence number and time stamp.
+        ("state", c_uint32),  # Number of the `State`.
+        ("active_limits", c_uint32),  # Bits of the `Limit`s that this cycle has reached, or nearly.
+        ("diagnostic", Diagnostic),  # Why the state is not active, or soon will not be.
+        ("request_epoch", c_uint64),  # Epoch of the last command message that was carried out or refused; the largest number for a request over the control socket or by a signal.
+        ("request_sequence", c_uint64),  # Sequence number of that message; a number that identifies the other requests.
+        ("request_diagnostic", Diagnostic),  # Why that request was refused; code 0 if it was carried out.
+        ("pose_valid", c_uint32),  # 1 if the fields from `x` to `time_to_singularity_s` are valid.
+        ("error_valid", c_uint32),  # 1 if `position_error_m` and `orientation_error_rad` are valid.
+        ("x", c_double * 6),  # Measured pose as X, by forward kinematics. [rad, m]
+        ("twist", c_double * 6),  # Measured omega, then v, base axes. [rad/s, m/s]
+        ("condition", c_double),  # Condition of that pose.
+        ("time_to_singularity_s", c_double),  # Time until a singular pose if the platform continues its motion; infinite if none is ahead. [s]
+        ("position_error_m", c_double * 3),  # C_d - C. [m]
+        ("orientation_error_rad", c_double * 3),  # log(R_d R^T). [rad]
+        ("wrench_error", c_double * 6),  # Torque about C, then force, base axes, of the actuators minus that of the control law: zero unless forces are limited. [N m, N]
+        ("missed_measurements", c_uint64),  # Cycles under control without a new valid measurement.
+        ("missed_setpoints", c_uint64),  # Cycles under control without a new valid setpoint.
+        ("counters", LoopCounters),  # Counters of the real-time thread.
+        ("io", IoCounters),  # Counters of the I/O thread.
+        ("in_position", c_uint32),  # 1 while the platform follows a setpoint that does not change, and has been within the tolerance of it for the settling time (`[in_position]`).
+        ("setpoint_error_valid", c_uint32),  # 1 if `setpoint_position_error_m` and `setpoint_orientation_error_rad` are valid.
+        ("setpoint_position_error_m", c_double * 3),  # C of the setpoint minus C. [m]
+        ("setpoint_orientation_error_rad", c_double * 3),  # log(R_setpoint R^T). [rad]
+        ("limits_scale", c_double),  # `limits.scale` in force.
+    ]
+
+    @staticmethod
+    def type_name():
+        return "hexad_status"
+
+
 class Times(ctypes.Structure):
     """Distribution of a time, from a histogram of three digits. All zero where nothing was recorded."""
 
@@ -312,10 +350,13 @@ class WorstCycle(ctypes.Structure):
         return "hexad_worst_cycle"
 
 
-class Statistics(ctypes.Structure):
-    """Statistics of the loop, renewed every second."""
+class Statistics(Message):
+    """Timing of the loop, published every second."""
 
+    topic = "statistics"
+    schema = 1
     _fields_ = [
+        ("header", Header),  # Schema version, publisher, sequence number and time stamp.
         ("window", LoopTimes),  # The last complete second.
         ("total", LoopTimes),  # Since start.
         ("worst", WorstCycle * 8),  # Since start, the worst first.
@@ -324,37 +365,3 @@ class Statistics(ctypes.Structure):
     @staticmethod
     def type_name():
         return "hexad_statistics"
-
-
-class Status(Message):
-    """State of the daemon, published every cycle."""
-
-    topic = "status"
-    schema = 6
-    _fields_ = [
-        ("header", Header),  # Schema version, publisher, sequence number and time stamp.
-        ("state", c_uint32),  # Number of the `State`.
-        ("active_limits", c_uint32),  # Bits of the `Limit`s that this cycle has reached, or nearly.
-        ("diagnostic", Diagnostic),  # Why the state is not active, or soon will not be.
-        ("request_epoch", c_uint64),  # Epoch of the last command message that was carried out or refused; the largest number for a request over the control socket or by a signal.
-        ("request_sequence", c_uint64),  # Sequence number of that message; a number that identifies the other requests.
-        ("request_diagnostic", Diagnostic),  # Why that request was refused; code 0 if it was carried out.
-        ("pose_valid", c_uint32),  # 1 if the fields from `x` to `time_to_singularity_s` are valid.
-        ("error_valid", c_uint32),  # 1 if `position_error_m` and `orientation_error_rad` are valid.
-        ("x", c_double * 6),  # Measured pose as X, by forward kinematics. [rad, m]
-        ("twist", c_double * 6),  # Measured omega, then v, base axes. [rad/s, m/s]
-        ("condition", c_double),  # Condition of that pose.
-        ("time_to_singularity_s", c_double),  # Time until a singular pose if the platform continues its motion; infinite if none is ahead. [s]
-        ("position_error_m", c_double * 3),  # C_d - C. [m]
-        ("orientation_error_rad", c_double * 3),  # log(R_d R^T). [rad]
-        ("wrench_error", c_double * 6),  # Torque about C, then force, base axes, of the actuators minus that of the control law: zero unless forces are limited. [N m, N]
-        ("missed_measurements", c_uint64),  # Cycles under control without a new valid measurement.
-        ("missed_setpoints", c_uint64),  # Cycles under control without a new valid setpoint.
-        ("counters", LoopCounters),  # Counters of the real-time thread.
-        ("io", IoCounters),  # Counters of the I/O thread.
-        ("statistics", Statistics),  # Timing of the loop.
-    ]
-
-    @staticmethod
-    def type_name():
-        return "hexad_status"
