@@ -93,7 +93,7 @@ pub const UNSEEN: Bounds = Bounds { acceleration: 1.03, jerk: 1.6, ..GENTLE };
 pub const STRUCK: Bounds = Bounds { acceleration: 3.2, jerk: 23.0, ..LONG };
 pub const SHAKEN: Bounds = Bounds { acceleration: 2.2, jerk: 6.4, rest_s: 1.4 };
 /// A fifth of its weight, within a cycle.
-pub const LOADED: Bounds = Bounds { acceleration: 1.1, ..PULLED };
+pub const LOADED: Bounds = Bounds { acceleration: 1.1, jerk: 1.08, ..PULLED };
 /// Ten times the weight of the platform: it falls.
 pub const LOAD: Bounds = Bounds { acceleration: 10.8, jerk: 6.4, rest_s: 0.2 };
 
@@ -152,7 +152,7 @@ pub fn in_mode(
             (wider(2.25, if is_pd { 6.3 } else { 3.0 }), cell)
         }
         ("a step of acceleration" | "daemon held for 5 ms", InMotion | Stopping) if is_gravity || is_pd => {
-            (wider(1.61, if is_pd { 6.3 } else { 2.1 }), cell)
+            (wider(1.61, if is_pd { 6.3 } else { 2.4 }), cell)
         }
         // Missing measurements are replaced by errors that vanish as the law wants it. Errors that hold up what the
         // model leaves out do not: force comes back with the next measurement.
@@ -204,8 +204,15 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
     let is_pd = mode == ControlMode::JointPd;
     let cell = match (name, situation, mode.includes_inertia()) {
         // What accelerates the platform is known only where the model has its inertia.
-        ("a load of a fifth of the platform" | "struck with 1 g for 10 ms", _, false)
-        | ("a drive shakes by a tenth at 30 Hz", Stopping | Parking, false) => On,
+        (
+            "a load of a tenth of the platform"
+            | "a load of a fifth of the platform"
+            | "struck with 1 g for 10 ms",
+            _,
+            false,
+        )
+        | ("a drive shakes by a tenth at 30 Hz", InMotion | Stopping | Parking, false) => On,
+        ("a drive shakes by a tenth at 30 Hz", InMotion, true) => Brake(DiagnosticCode::Oscillation),
         ("a drive shakes by a tenth at 30 Hz", Engaging, false) => {
             Path(&[(State::Active, DiagnosticCode::None), (State::Fault, DiagnosticCode::Oscillation)])
         }
@@ -219,8 +226,10 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
             Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FeedbackSaturated)])
         }
         ("a leg without force", Stopping, false) => On,
-        ("a drive reports half of its force", Stopping, false) if !is_pd => On,
         ("the drives brake by themselves" | "the drives brake and setpoints end", Parking, true) => LASTING,
+        ("the drives brake by themselves" | "the drives brake and setpoints end", Stopping, true) => {
+            Path(&[(State::Stopping, DiagnosticCode::Impact), (State::Fault, MeasurementImplausible)])
+        }
         ("the drives brake by themselves" | "the drives brake and setpoints end", Stopping, false) => {
             Brake(SensorFrozen)
         }

@@ -142,7 +142,7 @@ pub const ROWS: &[Row] = &[
     ("a step of acceleration", setpoints::step_of_acceleration, Bounds { jerk: 1.1, ..LATE }, [
         Idle(State::Standby, SetpointTooFast),
         Path(&[(State::Active, DiagnosticCode::None), (State::Stopping, SetpointTooFast), (State::Fault, SetpointTooFast)]),
-        Stop(SetpointTooFast), Stop(SetpointTooFast), On, On, On,
+        Stop(SetpointTooFast), Stop(SetpointBeyondLimits), On, On, On,
     ]),
     ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [
         Idle(State::Standby, SetpointOutOfReach), LATE_STOP, Stop(SetpointBeyondLimits),
@@ -189,7 +189,9 @@ pub const ROWS: &[Row] = &[
         On, Brake(VelocityError), Brake(DriveForceMissing), Brake(DriveForceMissing),
         Brake(DriveForceMissing), Brake(DriveForceMissing), On,
     ]),
-    ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
+    ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, [
+        On, On, On, On, Stop(PayloadChanged), On, On,
+    ]),
     ("a load of a fifth of the platform", machine::load_of_a_fifth, LOADED, [
         On, On, On, Stop(PayloadChanged), Stop(PayloadChanged), Stop(PayloadChanged), On,
     ]),
@@ -198,7 +200,7 @@ pub const ROWS: &[Row] = &[
     ]),
     ("a drive shakes by a tenth at 30 Hz", machine::shaking_drive, SHAKEN, [
         On, Path(&[(State::Active, DiagnosticCode::None), (State::Fault, DriveForceMissing)]),
-        Brake(Oscillation), Brake(Oscillation), Brake(DriveForceMissing), Brake(DriveForceMissing), On,
+        Brake(Oscillation), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), On,
     ]),
     ("a load of ten platforms", machine::load_of_ten, LOAD, [
         On, Brake(MeasurementImplausible), Stop(Impact), STRUCK_IMPLAUSIBLE, STRUCK_IMPLAUSIBLE,

@@ -131,7 +131,7 @@ fn relative_steps_add_up() {
         goto(&machine, &["--relative", "--z-mm", "0.1", "--tolerance", "1e-9"]);
     let words = "the reference has reached the target, but the platform was not in position";
     assert!(
-        code.code() == Some(1) && stderr.contains(words) && stderr.contains("tolerance 1e-6 mm"),
+        code.code() == Some(1) && stderr.contains(words) && stderr.contains("tolerance 1.00e-6 mm"),
         "{stderr}"
     );
     does(&machine, "stop", &[], &["standby"]);
