@@ -48,6 +48,7 @@
 //! | --- | --- |
 //! | active, engaging, parking, stopping, standby, off, fault | states of the controller, see [`control::signals::state`] |
 //! | actuator, drive | prismatic joint of a leg with its motor; stroke, rate and force are limited |
+//! | approach | motion of the reference to a setpoint or target that is away from it |
 //! | assembly mode | one of the up to 40 poses that share the same six leg lengths |
 //! | axial, transverse | along a leg; normal to it |
 //! | brakes | hold the legs while forces are disabled |
@@ -70,6 +71,7 @@
 //! | following error | distance of the platform from the reference |
 //! | hold | constant force or pose between two instants |
 //! | home | configured pose from which the machine starts and to which it parks |
+//! | in position | the measured pose has been within a tolerance of an unchanged setpoint for the settling time, `[in_position]` |
 //! | innovation | measured minus predicted tracking error |
 //! | jog | motion by keys, while they are held |
 //! | kinematic state | pose with its leg lengths and the factorization of N, see [`model::kinematic_state`] |

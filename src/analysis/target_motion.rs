@@ -233,7 +233,7 @@ pub fn target_motion(
     let (mut nearest_yet, mut progress_ns, mut stopped_by) = (whole, 0, LimitSet::default());
     let mut left = whole;
     let at_velocity = speed * slow_progress(constants);
-    while left > (REACHED_SHARE * whole).min(1.0) {
+    while left > (REACHED_SHARE * whole).clamp(ROUNDING / REACHED_M, 1.0) {
         let before = *reference.motion();
         let end_ns = reference.time_ns() + period_ns;
         reference.advance(constants, end_ns, Some(&Target::Pose { pose: to, speed_share: speed }));

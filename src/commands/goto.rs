@@ -131,8 +131,9 @@ fn drive(
     duration_s: f64,
     stop: &Stop,
 ) -> Result<(), TargetError> {
-    let longest_s = LONGEST_SHARE * duration_s + LONGEST_EXTRA_S;
-    let (mut resting, mut arrival) = (None, InPosition::default());
+    let settling_s = window.settling_ns as f64 * 1e-9;
+    let longest_s = LONGEST_SHARE * duration_s + LONGEST_EXTRA_S + settling_s;
+    let (mut resting, mut arrival, mut has_reference_arrived) = (None, InPosition::default(), false);
     loop {
         if stop.is_repeated() {
             return Err(TargetError::Interrupted);
@@ -145,7 +146,7 @@ fn drive(
             continue;
         };
         if stop.is_requested() && resting.is_none() {
-            resting = Some(source.resting_x(constants)?);
+            (resting, has_reference_arrived) = (Some(source.resting_x(constants)?), false);
             source.set_speed(1.0);
         }
         let x = resting.unwrap_or(to);
@@ -159,10 +160,12 @@ fn drive(
         if requested < since || !has_received(&answer, &x) {
             continue;
         }
-        if resting.is_some() && is_reached(&source.present_x()?, &x) {
+        // Kept, because the reference is the measured pose plus its error, with the noise of both.
+        has_reference_arrived |= is_reached(&source.present_x()?, &x);
+        if resting.is_some() && has_reference_arrived {
             return Err(TargetError::Interrupted);
         }
-        let error = error_to(&answer, &x);
+        let error = error_to(&answer, &x).filter(|_| has_reference_arrived);
         let requested_ns = nanoseconds(requested.duration_since(since).as_secs_f64());
         if resting.is_none() && arrival.update(window, requested_ns, &x, error.as_ref()) {
             return arrived(&source, since, error.unwrap_or_default());

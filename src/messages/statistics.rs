@@ -59,7 +59,7 @@ message! {
 }
 
 message! {
-    /// Timing of the loop, published every second.
+    /// Timing of the loop, published every second of real time.
     StatisticsMessage = "hexad_statistics" on "statistics" schema 1 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,

@@ -96,7 +96,11 @@ fn program_in_c() -> String {
              1, to);\n}}\n}}\n"
         );
     }
-    text += "int main(int count, char **arguments) {\nFILE *from, *to;\nint at = 1;\nif (count != 11) return 1;\n";
+    let count = 1 + 2 * MESSAGES.len();
+    let _ = writeln!(
+        text,
+        "int main(int count, char **arguments) {{\nFILE *from, *to;\nint at = 1;\nif (count != {count}) return 1;"
+    );
     for Layout { type_name, .. } in MESSAGES {
         let _ = write!(
             text,
@@ -111,7 +115,7 @@ const PROGRAM_IN_PYTHON: &str = "
 import ctypes, sys, hexad
 from hexad import messages
 verdicts = ''
-for at, name in enumerate(['Setpoint', 'Measured', 'Command', 'Force', 'Status']):
+for at, name in enumerate(['Setpoint', 'Measured', 'Command', 'Force', 'Status', 'Statistics']):
     kind = getattr(messages, name)
     source, target = sys.argv[1 + 2 * at : 3 + 2 * at]
     content, copied = open(source, 'rb').read(), b''

@@ -1,9 +1,10 @@
-//! The chart of sources and targets in `docs/operator.md`: each of its cells is played, and what it says must come.
+//! The chart of sources and targets in `docs/operator.md`: each of its cells is played, and the outcome must be that of the
+//! cell. What stands behind its colon is not played.
 
 use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::signals::inputs::SetpointKind;
 use hexad::control::signals::state::{AfterStop, Request, State};
-use hexad::model::task::TaskState;
+use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use nalgebra::Vector6;
 
@@ -17,13 +18,6 @@ const MACHINE: &str = "motion_base";
 /// Cycles of a scene at most, and of the motion that a scene in motion has played before the event.
 const CYCLES: u32 = 8000;
 const PLAYED: u32 = 1300;
-
-/// What is sent in the cycles after the event.
-struct Sent {
-    kind: SetpointKind,
-    /// `None` for nothing.
-    task: Option<TaskState>,
-}
 
 /// A scene: the platform before the event, and what happens then.
 struct Scene<'a> {
@@ -97,25 +91,24 @@ impl<'a> Scene<'a> {
         task
     }
 
-    /// What the event sends in a cycle after it.
-    fn sent(&self, k: u32, begins_at: &TaskState) -> Sent {
+    /// What the event sends in a cycle after it; `None` for nothing.
+    fn sent(&self, k: u32, begins_at: &TaskState) -> (SetpointKind, Option<TaskState>) {
         let far = Vector6::new(0.0, 0.0, 0.0, 0.02, -0.01, 0.0);
-        let (kind, task) =
-            match self.event.trim_start_matches("`engage`, ").split(';').next().unwrap_or_default() {
-                "setpoints where the platform stands" => (SetpointKind::Motion, Some(*begins_at)),
-                "setpoints in motion, away from the platform" => {
-                    (SetpointKind::Motion, Some(self.playing(PLAYED + k, far)))
-                }
-                "no setpoints" | "its source ends" => (SetpointKind::Motion, None),
-                "a target" => (SetpointKind::Target, Some(self.target())),
-                "the setpoint jumps" => (SetpointKind::Motion, Some(beside(begins_at, far))),
-                "poses alone" => (
-                    SetpointKind::Pose,
-                    Some(TaskState::at_rest(self.playing(PLAYED + k, Vector6::zeros()).x.into())),
-                ),
-                event => panic!("the chart has an unknown event: {event}"),
-            };
-        Sent { kind, task }
+        let event = self.event.trim_start_matches("`engage`, ").split(';').next().unwrap_or_default();
+        match event {
+            "setpoints where the platform stands" => (SetpointKind::Motion, Some(*begins_at)),
+            "setpoints in motion, away from the platform" => {
+                (SetpointKind::Motion, Some(self.playing(PLAYED + k, far)))
+            }
+            "no setpoints" | "its source ends" => (SetpointKind::Motion, None),
+            "a target" => (SetpointKind::Target, Some(self.target())),
+            "the setpoint jumps" => (SetpointKind::Motion, Some(beside(begins_at, far))),
+            "poses alone" => {
+                let pose = self.playing(PLAYED + k, Vector6::zeros()).x.into();
+                (SetpointKind::Pose, Some(TaskState::at_rest(pose)))
+            }
+            _ => panic!("the chart has an unknown event: {event}"),
+        }
     }
 
     /// Plays the event, and compares what comes with a cell.
@@ -124,13 +117,10 @@ impl<'a> Scene<'a> {
             self.ride.rig.ask(Request::Engage);
         }
         let begins_at = self.ride.rig.simulator.state();
-        let begins_at = TaskState::at_rest(hexad::model::task::task_coordinates(
-            &begins_at.pose,
-            &self.ride.home.x.into(),
-        ));
+        let begins_at = TaskState::at_rest(task_coordinates(&begins_at.pose, &self.ride.home.x.into()));
         let (mut last, mut output) = (None, None);
         for k in 0..CYCLES {
-            let Sent { kind, task } = self.sent(k, &begins_at);
+            let (kind, task) = self.sent(k, &begins_at);
             last = task;
             output = Some(self.ride.cycle(kind, task));
         }

@@ -221,5 +221,9 @@ fn a_step_of_a_micrometre_takes_time_and_no_step_takes_none() {
         assert!((0.8..4.0).contains(&(motion.duration_s / fastest)), "{length}: {motion:?}");
         println!("  {:?}", motion.limited_shares);
     }
-    assert_eq!(target_motion(&constants, &home, &home, 1.0, |_, _| ()).unwrap().duration_s, 0.0);
+    for rounding in [0.0, 1e-15, 1e-12] {
+        let step = Twist { angular: Vector3::z() * rounding, linear: Vector3::z() * rounding };
+        let motion = target_motion(&constants, &home, &home.displaced(&step), 1.0, |_, _| ()).unwrap();
+        assert_eq!(motion.duration_s, 0.0, "{rounding}");
+    }
 }

@@ -23,10 +23,10 @@
 // Role of a client: publishes measurements and receives forces.
 #define HEXAD_DRIVER 1
 
-// Role of a client: publishes setpoints and in-band requests; receives status and measurements.
+// Role of a client: publishes setpoints and in-band requests; receives status, statistics and measurements.
 #define HEXAD_SOURCE 2
 
-// Role of a client: receives status and measurements.
+// Role of a client: receives status, statistics and measurements.
 #define HEXAD_MONITOR 4
 
 // Added to a role for a daemon with `release = "lockstep"`: all times are those of the measured messages.
@@ -150,6 +150,14 @@ enum hexad_result hexad_publish_request(struct hexad_client *client,
 // `client` is NULL or from hexad_open; `status` is NULL or room for a message.
 enum hexad_result hexad_latest_status(struct hexad_client *client,
                                       struct hexad_status *status);
+
+// The newest statistics of the loop, in the same way. The daemon sends them every second.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open; `statistics` is NULL or room for a message.
+enum hexad_result hexad_latest_statistics(struct hexad_client *client,
+                                          struct hexad_statistics *statistics);
 
 // The newest measurement of the driver, in the same way.
 //

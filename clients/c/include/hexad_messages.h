@@ -375,7 +375,7 @@ static_assert(offsetof(struct hexad_worst_cycle, steal_ms) == 44, "steal_ms");
 
 #define HEXAD_STATISTICS_TOPIC "statistics"
 #define HEXAD_STATISTICS_SCHEMA 1u
-/* Timing of the loop, published every second. */
+/* Timing of the loop, published every second of real time. */
 struct hexad_statistics {
     struct hexad_header header; /* Schema version, publisher, sequence number and time stamp. */
     struct hexad_loop_times window; /* The last complete second. */

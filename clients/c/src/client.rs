@@ -5,8 +5,8 @@ use std::sync::{Mutex, TryLockError};
 
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{
-    Bus, CommandMessage, ForceMessage, MeasuredMessage, Message, Publisher, SetpointMessage, StatusMessage,
-    Subscriber,
+    Bus, CommandMessage, ForceMessage, MeasuredMessage, Message, Publisher, SetpointMessage,
+    StatisticsMessage, StatusMessage, Subscriber,
 };
 
 use crate::outcome::hexad_result::{HEXAD_BUSY, HEXAD_INTERNAL, HEXAD_INVALID, HEXAD_OK};
@@ -50,8 +50,10 @@ pub struct Source {
 /// Ports that only receive.
 pub struct Monitor {
     statuses: Subscriber<StatusMessage>,
+    timings: Subscriber<StatisticsMessage>,
     measured: Subscriber<MeasuredMessage>,
     status: Option<StatusMessage>,
+    statistics: Option<StatisticsMessage>,
     measurement: Option<MeasuredMessage>,
 }
 
@@ -189,14 +191,20 @@ impl Source {
 
 impl Monitor {
     fn open(bus: &Bus) -> Result<Self, Failure> {
-        let (statuses, measured) = (subscriber(bus)?, subscriber(bus)?);
-        Ok(Self { statuses, measured, status: None, measurement: None })
+        let (statuses, timings, measured) = (subscriber(bus)?, subscriber(bus)?, subscriber(bus)?);
+        Ok(Self { statuses, timings, measured, status: None, statistics: None, measurement: None })
     }
 
     /// The newest status.
     pub fn latest_status(&mut self) -> Option<StatusMessage> {
         self.status = self.statuses.receive_latest().or(self.status);
         self.status
+    }
+
+    /// The newest statistics.
+    pub fn latest_statistics(&mut self) -> Option<StatisticsMessage> {
+        self.statistics = self.timings.receive_latest().or(self.statistics);
+        self.statistics
     }
 
     /// The newest measurement.

@@ -14,7 +14,9 @@ use core::ffi::{CStr, c_char};
 use std::ptr;
 
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{CommandMessage, ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use hexad::messages::{
+    CommandMessage, ForceMessage, MeasuredMessage, SetpointMessage, StatisticsMessage, StatusMessage,
+};
 
 use self::client::{Ports, hexad_client, with};
 use self::outcome::hexad_result::{self, HEXAD_BRAKE, HEXAD_INVALID, HEXAD_NOTHING, HEXAD_OK};
@@ -25,9 +27,9 @@ pub const HEXAD_ABI: u32 = 0;
 
 /// Role of a client: publishes measurements and receives forces.
 pub const HEXAD_DRIVER: u32 = 1;
-/// Role of a client: publishes setpoints and in-band requests; receives status and measurements.
+/// Role of a client: publishes setpoints and in-band requests; receives status, statistics and measurements.
 pub const HEXAD_SOURCE: u32 = 2;
-/// Role of a client: receives status and measurements.
+/// Role of a client: receives status, statistics and measurements.
 pub const HEXAD_MONITOR: u32 = 4;
 /// Added to a role for a daemon with `release = "lockstep"`: all times are those of the measured messages.
 pub const HEXAD_SIMULATED: u32 = 8;
@@ -208,6 +210,24 @@ pub unsafe extern "C" fn hexad_latest_status(
         let found = unsafe { with(client, |ports| ports.monitor().map(client::Monitor::latest_status)) }?;
         // SAFETY: the caller's promise.
         unsafe { write_found(status, found, "status") }
+    })
+}
+
+/// The newest statistics of the loop, in the same way. The daemon sends them every second.
+///
+/// # Safety
+///
+/// `client` is NULL or from hexad_open; `statistics` is NULL or room for a message.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hexad_latest_statistics(
+    client: *mut hexad_client,
+    statistics: *mut StatisticsMessage,
+) -> hexad_result {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        let found = unsafe { with(client, |ports| ports.monitor().map(client::Monitor::latest_statistics)) }?;
+        // SAFETY: the caller's promise.
+        unsafe { write_found(statistics, found, "statistics") }
     })
 }
 

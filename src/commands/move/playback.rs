@@ -226,14 +226,19 @@ impl<'a> Playback<'a> {
 
     /// Starts again from the present pose. An error if the platform was to come to rest under control.
     fn start_over(&mut self) -> Result<(), MoveError> {
-        if self.is_ending {
-            let status = self.status.unwrap_or_default();
-            let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-            return Err(MoveError::Ended(status.state().unwrap_or_default(), diagnostic));
+        if self.is_ending || matches!(self.phase, Phase::Holding(..)) {
+            return Err(self.ended());
         }
         warn!("the daemon gave up control or is gone: starting again from the present pose");
         self.phase = Phase::Waiting;
         Ok(())
+    }
+
+    /// The error of control that has ended.
+    fn ended(&self) -> MoveError {
+        let status = self.status.unwrap_or_default();
+        let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+        MoveError::Ended(status.state().unwrap_or_default(), diagnostic)
     }
 
     fn setpoint(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
@@ -278,6 +283,9 @@ impl<'a> Playback<'a> {
             }
             Phase::Paused(path, t) => motion(TaskState::at_rest(path.at(*t, self.trajectory).x.into())),
             Phase::Holding(task, since_ns) => {
+                if now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
+                    return Err(self.ended());
+                }
                 if now_ns.saturating_sub(*since_ns) > HOLD_TIME_NS {
                     info!("the platform stands under control; hexad stop or park ends it");
                     return Ok(PlaybackStep::Finished);

@@ -2,7 +2,7 @@
 //!
 //! The daemon's reference generator makes the motion, so no target can exceed a limit. A target has no end:
 //! after its source has ended, the platform holds it under control until another source, `stop` or `park`. So
-//! a command ends when its target is reached.
+//! a command ends when its target is reached, and `goto` when the platform is in position.
 
 use core::fmt;
 use std::sync::mpsc::{Receiver, TryRecvError};

@@ -18,6 +18,7 @@ use super::reader::SectionReader;
 use crate::analysis::envelope;
 use crate::control::parameters::ViolationPolicy;
 use crate::control::supervision::in_position::InPositionWindow;
+use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::Machine;
 
 mod control;
@@ -37,8 +38,9 @@ const MIN_MEASURED_PERIODS: f64 = 1.5;
 const MAX_TIMEOUT_MS: f64 = 1000.0;
 /// Largest deceleration of the brakes \[m/s^2\]: a hundred times gravity is an impact.
 const MAX_BRAKE_DECELERATION_M_S2: f64 = 1000.0;
-/// Default of `in_position.tolerance_m`, over the noise of a length: noise alone does not exceed it.
-const IN_POSITION_PER_NOISE: f64 = 10.0;
+/// Defaults of `in_position.tolerance_*`, over the RMS error of the pose by noise of the lengths: noise alone does not exceed
+/// them in the settling time.
+const IN_POSITION_PER_NOISE: f64 = 5.0;
 /// Largest tolerance \[m\], \[rad\]: a larger one is in a wrong unit.
 const MAX_IN_POSITION: f64 = 0.1;
 /// Default and largest settling time \[ms\]: a few periods of the slowest loops; longer than people wait.
@@ -133,10 +135,14 @@ fn setpoint(mut section: SectionReader) -> SetpointPolicy {
 }
 
 fn in_position(mut section: SectionReader, noise: &SensorNoise, machine: &Machine) -> InPositionWindow {
-    let tolerance_m = rounded_down(IN_POSITION_PER_NOISE * noise.length_m).min(MAX_IN_POSITION);
-    let tolerance_m = section.number_or("tolerance_m", tolerance_m, Bound::UpTo(MAX_IN_POSITION));
-    let tolerance_rad = rounded_down(tolerance_m / machine.joints.radius).min(MAX_IN_POSITION);
-    let tolerance_rad = section.number_or("tolerance_rad", tolerance_rad, Bound::UpTo(MAX_IN_POSITION));
+    // RMS errors of the pose at home by errors of the lengths of RMS 1.
+    let by_lengths = leg_wrenches(machine, &machine.home_pose()).try_inverse().unwrap_or_default();
+    let [angular, linear] = [0, 3].map(|first| by_lengths.fixed_columns::<3>(first).norm());
+    let default =
+        |error: f64| rounded_down(IN_POSITION_PER_NOISE * noise.length_m * error).min(MAX_IN_POSITION);
+    let bound = Bound::UpTo(MAX_IN_POSITION);
+    let tolerance_m = section.number_or("tolerance_m", default(linear), bound);
+    let tolerance_rad = section.number_or("tolerance_rad", default(angular), bound);
     let longest = Bound::Within(0.0, MAX_SETTLING_MS);
     let settling_ms = section.number_or("settling_ms", DEFAULT_SETTLING_MS, longest);
     section.finish();

@@ -18,10 +18,10 @@ use crate::control::supervision::supervisor::Findings;
 /// Deviation of the reference from its target at which the target counts as reached, as a ratio of the engage
 /// tolerance: near enough to a setpoint in motion, and at home almost at rest.
 const REACHED_RATIO: f64 = 0.05;
-/// Time after which a target that was within the engage tolerance counts as reached. A source whose motion needs all of a
-/// limit leaves nothing for the rest of the way; under "limit" it may even be lost again.
-const NEAR_TIME_NS: u64 = 1_000_000_000;
 const AT_HOME_RATIO: f64 = 0.005;
+/// Time within the engage tolerance after which a target counts as reached, under "limit" also if it was left again. A source
+/// whose motion needs all of a limit leaves nothing for the rest of the way.
+const NEAR_TIME_NS: u64 = 1_000_000_000;
 
 /// Inputs of an assessment, besides the memory of the stages.
 pub(in crate::control) struct Evidence<'a> {
@@ -74,6 +74,9 @@ pub(in crate::control) fn assess(
         _ => check_engagement(cycle, evidence, &conditioned, &start),
     };
     let is_waiting = cycle.state == State::Engaging && !is_ready;
+    if is_waiting {
+        *near_since_ns = None;
+    }
     let has_ended = !is_waiting && has_ended(cycle, setpoint, reference, near_since_ns);
     let sensor_may_be_frozen = evidence.may_be_frozen;
     Findings { localization: *located, start, engagement, tracking, sensor_may_be_frozen, has_ended }
@@ -140,25 +143,35 @@ fn has_ended(
         let deviation = reference.offset_to(cycle.constants, target);
         deviation.map_or(f64::INFINITY, |deviation| parameters.engage_tolerance_ratio(&deviation))
     };
-    let since_ns = near_since_ns.take();
+    if let State::Engaging = cycle.state
+        && setpoint.age_check.is_ok()
+        && let Some(target) = &setpoint.target
+    {
+        return has_arrived(ratio(target), parameters.on_violation, cycle.release_ns, near_since_ns);
+    }
+    *near_since_ns = None;
     match cycle.state {
-        State::Engaging => {
-            let target = setpoint.target.as_ref().filter(|_| setpoint.age_check.is_ok());
-            let Some(ratio) = target.map(ratio) else { return false };
-            let may_be_far = parameters.on_violation == ViolationPolicy::Limit && since_ns.is_some();
-            if ratio <= 1.0 || may_be_far {
-                let since_ns = *near_since_ns.insert(since_ns.unwrap_or(cycle.release_ns));
-                return ratio <= REACHED_RATIO || cycle.release_ns.saturating_sub(since_ns) >= NEAR_TIME_NS;
-            }
-            false
-        }
         State::Stopping => reference.is_at_rest(),
         State::Parking => {
             let home = Target::Pose { pose: cycle.constants.home.pose(), speed_share: 1.0 };
             ratio(&home) <= AT_HOME_RATIO
         }
-        State::Off | State::Standby | State::Active | State::Fault => false,
+        State::Off | State::Standby | State::Engaging | State::Active | State::Fault => false,
     }
+}
+
+/// Whether an engaging platform is on its target, or has been near it for long enough. `ratio` is the deviation of the
+/// reference from the target over the engage tolerance.
+pub(in crate::control) fn has_arrived(
+    ratio: f64,
+    policy: ViolationPolicy,
+    now_ns: u64,
+    near_since_ns: &mut Option<u64>,
+) -> bool {
+    let may_be_far = policy == ViolationPolicy::Limit && near_since_ns.is_some();
+    *near_since_ns = near_since_ns.or(Some(now_ns)).filter(|_| ratio <= 1.0 || may_be_far);
+    let is_long = near_since_ns.is_some_and(|since_ns| now_ns.saturating_sub(since_ns) >= NEAR_TIME_NS);
+    ratio <= REACHED_RATIO || is_long
 }
 
 /// Whether the platform is near the setpoint in pose and velocity. Otherwise closing the loop would itself

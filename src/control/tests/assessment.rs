@@ -13,7 +13,7 @@ use crate::control::signals::errors::{CommandedAcceleration, PoseError};
 use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
-use crate::control::supervision::assessment::{Evidence, assess};
+use crate::control::supervision::assessment::{Evidence, assess, has_arrived};
 use crate::control::supervision::supervisor::Findings;
 use crate::control::tests::*;
 use crate::model::rigid::{Acceleration, Motion, Twist};
@@ -243,6 +243,18 @@ fn engaging_ends_on_the_setpoint_once_the_drives_are_ready() {
         (State::Standby, true, false),
     ] {
         assert_eq!(Scene { is_ready, ..Scene::default() }.assess(state).has_ended, has_ended, "{state:?}");
+    }
+}
+
+#[test]
+fn engaging_ends_a_second_after_the_reference_was_near() {
+    const MS: u64 = 1_000_000;
+    for (policy, after_leaving) in [(ViolationPolicy::Stop, false), (ViolationPolicy::Limit, true)] {
+        let mut since_ns = None;
+        let mut at = |ratio: f64, now_ms: u64| has_arrived(ratio, policy, now_ms * MS, &mut since_ns);
+        assert!(!at(1.1, 0) && at(0.05, 1) && !at(0.06, 2) && !at(1.0, 1000) && at(1.0, 1001), "{policy:?}");
+        assert!(!at(f64::NAN, 0) || policy == ViolationPolicy::Limit);
+        assert_eq!((at(1.1, 1002), at(1.0, 1003)), (after_leaving, after_leaving), "{policy:?}");
     }
 }
 

@@ -119,7 +119,8 @@ impl StatusSource {
             in_position: Some(status.in_position == 1),
             setpoint_distance: status
                 .setpoint_error()
-                .map(|error| [error.linear.norm(), error.angular.norm()]),
+                .map(|error| [error.linear.norm(), error.angular.norm()])
+                .filter(|distance| distance.iter().all(|number| number.is_finite())),
             position_error_m: has_error.then_some(status.position_error_m),
             orientation_error_rad: has_error.then_some(status.orientation_error_rad),
             condition: is_known.then_some(status.condition),
@@ -222,6 +223,7 @@ mod tests {
         };
         snapshot.status.pose_valid = 1;
         (snapshot.status.condition, snapshot.status.time_to_singularity_s) = (f64::INFINITY, f64::INFINITY);
+        (snapshot.status.setpoint_error_valid, snapshot.status.setpoint_position_error_m) = (1, [1e200; 3]);
         // Without topics, the processes are unknown.
         let mut source =
             StatusSource { topics: Some(None), ..StatusSource::new(Arc::new(Loaded::new(config))) };
@@ -230,5 +232,6 @@ mod tests {
         let report = answer.status.unwrap();
         assert!(report.legs.len() == 6 && report.legs.iter().all(|leg| leg.length_m.is_nan()));
         assert_eq!((report.setpoint, report.condition, report.time_to_singularity_s), (None, None, None));
+        assert_eq!(report.setpoint_distance, None);
     }
 }

@@ -283,7 +283,7 @@ impl IoThread<'_> {
         let status = self.outputs.publish(&settings, cycle, input.setpoint.as_ref(), counters, delays);
         if statistics.update() {
             self.snapshot.window = statistics.value().window;
-            self.outputs.publish_statistics(*statistics.value());
+            self.outputs.publish_statistics(*statistics.value(), cycle.release_ns);
         }
         let [setpoint_rejection, measured_rejection] = self.inputs.last_rejections();
         self.snapshot = Snapshot {

@@ -72,9 +72,10 @@ impl Outputs {
         status
     }
 
-    /// Publishes the statistics of the last second.
-    pub fn publish_statistics(&mut self, statistics: StatisticsMessage) {
-        self.send_failures += u64::from(self.statistics.publish(monotonic_ns(), statistics).is_err());
+    /// Publishes the statistics of the last second, at the time of a cycle in simulated time.
+    pub fn publish_statistics(&mut self, statistics: StatisticsMessage, release_ns: u64) {
+        let time_ns = if self.is_simulated { release_ns } else { monotonic_ns() };
+        self.send_failures += u64::from(self.statistics.publish(time_ns, statistics).is_err());
     }
 
     /// Number of messages that could not be sent.

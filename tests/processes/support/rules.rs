@@ -46,7 +46,7 @@ pub fn ends_at_rest(recording: &Recording) {
     assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
     let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
     let measured = recording.measured.iter().rfind(until_then).expect("a measurement");
-    // Whoever was held during the stop, the platform moved on under the force of before.
+    // If a process was held during the stop, the platform continued under the last force.
     let before = recording
         .forces
         .iter()

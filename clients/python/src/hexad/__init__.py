@@ -12,7 +12,7 @@ A program that only publishes or receives uses `Client`; an operator's panel use
 
 from .client import Client, HexadError, Result, Role, judge, monotonic_ns, request, view
 from .driver import Driver, sleep_until
-from .messages import Command, Force, Measured, Setpoint, Status
+from .messages import Command, Force, Measured, Setpoint, Statistics, Status
 
 __all__ = [
     "Client",
@@ -24,6 +24,7 @@ __all__ = [
     "Result",
     "Role",
     "Setpoint",
+    "Statistics",
     "Status",
     "judge",
     "monotonic_ns",

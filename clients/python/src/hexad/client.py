@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import library, messages
-from .messages import Force, Measured, Setpoint, Status
+from .messages import Force, Measured, Setpoint, Statistics, Status
 
 if TYPE_CHECKING:
     import numpy
@@ -91,7 +91,8 @@ class Client:
         if not self._handle:
             raise HexadError(Result.SHARED_MEMORY)
         # Room for what is received, so that a period allocates little.
-        self._force, self._status, self._measured = Force(), Status(), Measured()
+        self._force, self._measured = Force(), Measured()
+        self._status, self._statistics = Status(), Statistics()
 
     def __enter__(self) -> Client:
         return self
@@ -130,6 +131,10 @@ class Client:
     def latest_status(self) -> Status | None:
         """The newest status; None before the first. The next call overwrites it."""
         return self._newest(_LIBRARY.hexad_latest_status, self._status)
+
+    def latest_statistics(self) -> Statistics | None:
+        """The newest statistics, sent every second; None before the first. The next call overwrites them."""
+        return self._newest(_LIBRARY.hexad_latest_statistics, self._statistics)
 
     def latest_measured(self) -> Measured | None:
         """The newest measurement of the driver; None before the first. The next call overwrites it."""

@@ -4,7 +4,7 @@ import ctypes
 import pathlib
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_uint32, c_uint64, c_void_p
 
-from .messages import Force, Measured, Setpoint, Status
+from .messages import Force, Measured, Setpoint, Statistics, Status
 
 # Version of the ABI that this package was written for: libhexad.so.0.
 ABI = 0
@@ -19,6 +19,7 @@ _FUNCTIONS = {
     "hexad_publish_setpoint": [c_void_p, c_uint64, POINTER(Setpoint)],
     "hexad_publish_request": [c_void_p, c_uint64, c_uint32],
     "hexad_latest_status": [c_void_p, POINTER(Status)],
+    "hexad_latest_statistics": [c_void_p, POINTER(Statistics)],
     "hexad_latest_measured": [c_void_p, POINTER(Measured)],
     "hexad_request": [c_char_p, c_uint32, c_bool, c_double],
 }

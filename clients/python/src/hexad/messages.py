@@ -351,7 +351,7 @@ class WorstCycle(ctypes.Structure):
 
 
 class Statistics(Message):
-    """Timing of the loop, published every second."""
+    """Timing of the loop, published every second of real time."""
 
     topic = "statistics"
     schema = 1
