@@ -123,6 +123,9 @@ fn pair(constants: &Constants, seed: u64) -> Outcome {
                     outcome.compared += 1;
                     let ratio = arrived_s / optimal_s(way, limits);
                     outcome.slowest = outcome.slowest.max(ratio);
+                    if ratio > LONGEST_RATIO {
+                        println!("seed {seed}: {ratio} times the fastest, {:?}", motion.limited_shares);
+                    }
                 }
             }
         }
