@@ -98,6 +98,16 @@ fn run(name: &str, seed: u64) -> (Largest, u64) {
     (largest, cycles)
 }
 
+/// Setpoints whose velocity is below the limit at the end of each cycle, and beyond it between.
+#[test]
+fn a_velocity_between_cycles_keeps_its_limit() {
+    for name in ["fried2008", "scattered"] {
+        let (largest, _) = run(name, 1_795_730_443 * 7919);
+        let velocity = largest.0["velocity"];
+        assert!((0.9999..1.0 + 1e-9).contains(&velocity), "{name}: {velocity:e}");
+    }
+}
+
 #[test]
 fn certificate_every_limit_is_kept() {
     let machines = MACHINES.len() as u64;

@@ -54,7 +54,8 @@ use crate::control::constants::Constants;
 use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::history::History;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::proof::{step::Step, verification::Verifier};
+use crate::control::reference::proof::step::{Step, inner_speeds};
+use crate::control::reference::proof::verification::Verifier;
 use crate::control::reference::proposal::approach::{Approach, TargetOffset, limit_leg_rates};
 use crate::control::reference::proposal::walls::Walls;
 use crate::control::reference::stop::constant_jerk::step_constant_jerk;
@@ -284,14 +285,9 @@ impl ReferenceGenerator {
             let (Acceleration { angular, linear }, effort) =
                 self.proposed(constants, target, &desired, step_s);
             step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
-            let (now, next) = (&begin.acceleration, &self.motion.acceleration);
-            let acceleration_change = Pair {
-                angular: (next.angular - now.angular).norm(),
-                linear: (next.linear - now.linear).norm(),
-            };
             let Self { strength, .. } = *self;
-            let step =
-                Step { from: Some(&begin.pose), duration: step_s, acceleration_change, effort, strength };
+            let inner_speeds = inner_speeds(&begin, &self.motion, step_s);
+            let step = Step { from: Some(&begin.pose), duration: step_s, inner_speeds, effort, strength };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.proportional_steps_left = match verified {

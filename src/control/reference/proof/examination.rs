@@ -106,11 +106,9 @@ impl<'a> StopExamination<'a> {
         let Limits { orientation, position, .. } = limits;
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
         let allowed = 1.0 + ROUNDING;
-        let excess = step.velocity_excess_over_ends();
-        let is_slow = v <= allowed * position.velocity
-            && w <= allowed * orientation.velocity
-            && motion.twist.linear.norm() + excess.linear <= position.velocity
-            && motion.twist.angular.norm() + excess.angular <= orientation.velocity;
+        let inner = &step.inner_speeds;
+        let is_slow = v.max(inner.linear) <= allowed * position.velocity
+            && w.max(inner.angular) <= allowed * orientation.velocity;
         if !is_slow {
             return Err(Limit::Velocity.into());
         }

@@ -15,6 +15,7 @@ use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
+use crate::control::reference::proof::tolerances::ROUNDING;
 use crate::control::reference::stop::acceleration_ranges::AccelerationRanges;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::stop::vector_stop::{StopExtent, release_first_extent};
@@ -46,7 +47,7 @@ impl Verifier {
         let limits = constants.parameters.limits.with_accelerations_scaled(step.strength);
         let turn = release_first_extent(&twist.angular, &acceleration.angular, &limits.orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, &limits.position);
-        let excess = step.velocity_excess_over_ends();
+        let (inner, allowed) = (&step.inner_speeds, 1.0 + ROUNDING);
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
         let around = RegularityQuery {
             pose,
@@ -60,8 +61,10 @@ impl Verifier {
         let speeds = Pair { angular: turn.peak_velocity, linear: shift.peak_velocity };
         let mut free = forces(StopKind::ReleaseFirst, speeds, &limits);
         let mut effort = MAX_STEP_EFFORT.saturating_sub(step.effort);
-        let is_free = shift.peak_velocity + excess.linear <= position.velocity
-            && turn.peak_velocity + excess.angular <= orientation.velocity
+        let is_free = shift.peak_velocity <= position.velocity
+            && turn.peak_velocity <= orientation.velocity
+            && inner.linear <= allowed * position.velocity
+            && inner.angular <= allowed * orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
             && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)

@@ -6,7 +6,8 @@ use fearless_simd::Level;
 use crate::control::parameters::Envelope;
 use crate::control::reference::Refusal;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::proof::{step::Step, verification::Verifier};
+use crate::control::reference::proof::step::{Step, inner_speeds};
+use crate::control::reference::proof::verification::Verifier;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::tests::*;
 use crate::control::setpoint::target::at_rest;
@@ -113,10 +114,18 @@ pub(super) struct PlayedStep {
 }
 
 impl PlayedStep {
-    fn step(&self) -> Step<'_> {
-        let norms = Pair { angular: self.jerk.angular.norm(), linear: self.jerk.linear.norm() };
-        let acceleration_change = norms.map(|jerk| jerk * self.duration);
-        Step { from: self.from.as_ref(), duration: self.duration, acceleration_change, ..Step::default() }
+    /// The step that ends with a motion.
+    fn step(&self, end: &Motion) -> Step<'_> {
+        let inner_speeds = inner_speeds(&self.begin(end), end, self.duration);
+        Step { from: self.from.as_ref(), duration: self.duration, inner_speeds, ..Step::default() }
+    }
+
+    /// Twist and acceleration at its start.
+    fn begin(&self, end: &Motion) -> Motion {
+        let (h, a) = (self.duration, end.acceleration.vector());
+        let jerk = self.jerk.vector();
+        let twist = Twist::from_vector(&(end.twist.vector() - a * h + jerk * (0.5 * h * h)));
+        Motion { pose: end.pose, twist, acceleration: Acceleration::from_vector(&(a - jerk * h)) }
     }
 }
 
@@ -190,7 +199,7 @@ impl Scene {
                 &self.constants,
                 &self.bounds,
                 &self.motion,
-                &self.step.step(),
+                &self.step.step(&self.motion),
                 &mut brake_at_once,
             )
         };
