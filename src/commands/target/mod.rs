@@ -99,7 +99,9 @@ impl Deviation {
 
 impl fmt::Display for Deviation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [mm, mrad] = [self.0.linear, self.0.angular].map(|error| significant(1e3 * error.norm()));
+        // To nanometres and nanoradians.
+        let [mm, mrad] =
+            [self.0.linear, self.0.angular].map(|error| significant(1e-6 * (1e9 * error.norm()).round()));
         write!(f, "{mm} mm and {mrad} mrad")
     }
 }
