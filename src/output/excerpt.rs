@@ -8,16 +8,17 @@ pub fn excerpt(text: &str) -> String {
     excerpt_of_length(text, MAX_SHOWN)
 }
 
-/// The same, cut after so many characters.
+/// The same, cut after so many characters as they are shown.
 pub fn excerpt_of_length(text: &str, max_shown: usize) -> String {
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    let mut shown = String::new();
-    for (i, c) in words.chars().enumerate() {
-        match c {
-            _ if i == max_shown => return shown + "...",
-            c if c.is_control() => shown.extend(c.escape_default()),
-            c => shown.push(c),
+    let (mut shown, mut count) = (String::new(), 0);
+    for c in words.chars() {
+        let letters = if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+        count += letters.chars().count();
+        if count > max_shown {
+            return shown + "...";
         }
+        shown += &letters;
     }
     shown
 }
@@ -31,6 +32,7 @@ mod tests {
         assert_eq!(excerpt(" [1,\n\t2]\r\n"), "[1, 2]");
         assert_eq!(excerpt("\u{1b}[2J\0\u{9b}"), "\\u{1b}[2J\\u{0}\\u{9b}");
         assert_eq!(excerpt(&"ä".repeat(60)), "ä".repeat(60));
+        assert_eq!(excerpt(&"\0".repeat(60)), "\\u{0}".repeat(12) + "...");
         assert_eq!(excerpt(&"ä".repeat(1_000_000)), "ä".repeat(60) + "...");
     }
 }

@@ -169,10 +169,10 @@ fn many_mistakes_are_counted() {
 fn what_a_file_says_is_shown_on_one_line_and_cut() {
     let key = format!("\"a\\nb\\u001b[2J{}\"", "c".repeat(1000));
     let found = violations(&format!("{key} = \"\"\"1\n2\"\"\"\n{REFERENCE}"));
-    let shown = format!("a b\\u{{1b}}[2J{}... = \"\"\"1 2\"\"\": unknown key, ", "c".repeat(53));
+    let shown = format!("a b\\u{{1b}}[2J{}... = \"\"\"1 2\"\"\": unknown key, ", "c".repeat(48));
     assert!(found.len() == 1 && found[0].to_string().starts_with(&shown), "{found:?}");
     let found = violations(&format!("\u{1b}[2J{}\n{REFERENCE}", "c".repeat(1000)));
-    let shown = format!("TOML syntax = \\u{{1b}}[2J{}...: ", "c".repeat(56));
+    let shown = format!("TOML syntax = \\u{{1b}}[2J{}...: ", "c".repeat(51));
     assert!(found.len() == 1 && found[0].to_string().starts_with(&shown), "{found:?}");
 }
 
