@@ -4,28 +4,26 @@
 //! after its source has ended, the platform holds it under control until another source, `stop` or `park`. So
 //! a command ends when its target is reached, and `goto` when the platform is in position.
 
-use core::fmt;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 
+pub use self::error::{Deviation, TargetError};
 use self::watch::{StatusWatch, Watched};
-use super::failure::{CommandError, INTERRUPTED, default_exit_code};
 use super::plant::prepare_thread;
 use super::request::carry_out_in_background;
-use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetRefusal, check_target};
+use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, check_target};
 use crate::config::Config;
 use crate::control::constants::Constants;
 use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::DerivativeLimits;
 use crate::control::signals::state::{Request, State};
-use crate::control::supervision::in_position::InPositionWindow;
 use crate::daemon::process_names::named;
 use crate::daemon::{self, nanoseconds};
 use crate::messages::clock::monotonic_ns;
-use crate::messages::{Bus, PortError, Publisher, SetpointMessage};
+use crate::messages::{Bus, Publisher, SetpointMessage};
 use crate::model::fidelity::Fidelity;
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::{TaskState, task_coordinates};
@@ -33,10 +31,10 @@ use crate::operator::protocol::AnswerLine as Answer;
 use crate::operator::requests::status;
 use crate::operator::status_report::{ProcessReport, StatusReport};
 use crate::operator::{OperatorError, Order};
-use crate::output::numbers::significant;
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::stop_request::Stop;
 
+mod error;
 pub mod pose_options;
 pub mod watch;
 
@@ -48,80 +46,6 @@ const SAME: f64 = 1e-12;
 
 /// Longest time between two status reports from which a velocity is computed \[s\].
 const MAX_REPORT_INTERVAL_S: f64 = 0.5;
-
-/// Reason why a target is not published, or not followed.
-#[derive(Debug, thiserror::Error)]
-pub enum TargetError {
-    #[error(transparent)]
-    Port(#[from] PortError),
-    #[error(transparent)]
-    Operator(#[from] OperatorError),
-    #[error(transparent)]
-    Refused(#[from] TargetRefusal),
-    #[error("the machine runs in simulated time, in which no person moves it; use hexad move")]
-    Simulated,
-    #[error("{0} publishes setpoints; end it first (hexad stop, or Ctrl-C there)")]
-    OtherSource(String),
-    #[error("the platform is not under control (state {0}: {1}); --engage takes control")]
-    NotInControl(String, String),
-    #[error("the pose of the platform is unknown: {0}")]
-    UnknownPose(String),
-    #[error("the daemon does not follow this target, but another setpoint: does another source run?")]
-    NotFollowed,
-    #[error("control has ended: the daemon is in {0}: {1}")]
-    Ended(String, String),
-    #[error("the target was not reached within {0:.1} s")]
-    TimedOut(f64),
-    #[error(
-        "the reference has reached the target, but the platform was not in position within {0:.1} s: it is {1} from the target, \
-         tolerance {tolerance} (in_position.tolerance_m, tolerance_rad, or --tolerance); look for friction, noise that is not \
-         stated, and a force that holds the platform; it stands under control",
-        tolerance = Deviation::of_window(.2)
-    )]
-    NotInPosition(f64, Deviation, InPositionWindow),
-    #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
-    Interrupted,
-    #[error("interrupted before control was taken; hexad status shows the state")]
-    InterruptedEarly,
-}
-
-/// Distance and angle, for people.
-#[derive(Debug)]
-pub struct Deviation(pub Twist);
-
-impl Deviation {
-    fn of_window(window: &InPositionWindow) -> Self {
-        let [linear, angular] =
-            [window.tolerance_m, window.tolerance_rad].map(|length| Vector3::x() * length);
-        Self(Twist { angular, linear })
-    }
-}
-
-impl fmt::Display for Deviation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // To nanometres and nanoradians.
-        let [mm, mrad] =
-            [self.0.linear, self.0.angular].map(|error| significant(1e-6 * (1e9 * error.norm()).round()));
-        write!(f, "{mm} mm and {mrad} mrad")
-    }
-}
-
-impl CommandError for TargetError {
-    fn has_begun(&self) -> bool {
-        match self {
-            Self::Port(_) | Self::Refused(_) | Self::Simulated => false,
-            Self::Operator(error) => error.has_begun(),
-            _ => true,
-        }
-    }
-
-    fn exit_code(&self) -> u8 {
-        match self {
-            Self::Interrupted | Self::InterruptedEarly => INTERRUPTED,
-            _ => default_exit_code(self),
-        }
-    }
-}
 
 /// Constants of the daemon's controller.
 pub fn constants(config: &Config) -> Constants {

@@ -7,7 +7,7 @@ use crate::model::rigid::Twist;
 pub struct InPositionWindow {
     /// Largest distance of C from the setpoint \[m\].
     pub tolerance_m: f64,
-    /// Largest angle between the orientation and that of the setpoint \[rad\].
+    /// Largest angle between the measured orientation and the orientation of the setpoint \[rad\].
     pub tolerance_rad: f64,
     /// Time for which both must hold \[ns\].
     pub settling_ns: u64,
