@@ -31,10 +31,6 @@ const TIMED_MOTIONS: usize = 256;
 /// them.
 const TIMING_ROUNDS: usize = 101;
 
-/// Least share of time that a fidelity with more terms must save to be recommended. A smaller difference is
-/// noise.
-const MIN_TIME_SAVED: f64 = 0.1;
-
 #[derive(Debug, clap::Args)]
 pub struct AdviseArguments {
     #[command(flatten)]
@@ -95,20 +91,7 @@ fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, Ad
         max_force_n: config.machine.actuator.max_force,
         tolerance,
         fidelities: rows.collect(),
-        recommended: choice(&comparison, &times, tolerance).name(),
-    })
-}
-
-/// The fastest fidelity within the tolerance that is available in a control loop.
-fn choice(comparison: &FidelityComparison, times: &[f64; FIDELITY_COUNT], tolerance: f64) -> Fidelity {
-    let time = |fidelity: Fidelity| {
-        let times = Fidelity::ALL.into_iter().zip(times);
-        times.filter(|(timed, _)| *timed == fidelity).map(|(_, time)| time).sum::<f64>()
-    };
-    let first = comparison.choice(tolerance);
-    let allowed = comparison.within(tolerance).map(|error| error.fidelity);
-    allowed.filter(|fidelity| fidelity.has_inertia()).fold(first, |best, fidelity| {
-        if time(fidelity) < (1.0 - MIN_TIME_SAVED) * time(best) { fidelity } else { best }
+        recommended: comparison.choice(tolerance).name(),
     })
 }
 
@@ -184,7 +167,8 @@ fn judge_trajectory(
     Ok((scene, FidelityComparison::of_rows(tally), motions))
 }
 
-/// Shortest time of an evaluation of each fidelity \[ns\]: whatever else runs on the computer only adds to it.
+/// Shortest time of an evaluation of each fidelity \[ns\]: whatever else runs on the computer only adds to it. It is
+/// shown and decides nothing, so that advice is the same twice and the same as of `fidelity = "auto"`.
 fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITY_COUNT] {
     let mut shortest = [f64::INFINITY; FIDELITY_COUNT];
     for _ in 0..TIMING_ROUNDS {
