@@ -31,6 +31,7 @@ mod stamp_clock;
 mod stamps;
 mod targets;
 mod tracking;
+mod transmission;
 mod trust;
 mod unstated;
 mod weak_poses;

@@ -88,7 +88,7 @@ fn differences(machine: &Machine, motions: &[Motion], found: &[[f64; LEGS]]) -> 
 
 /// MuJoCo's Coulomb friction is a constraint and no force of a motion.
 fn without_dry_friction(mut machine: Machine) -> Machine {
-    machine.actuator.coulomb_friction = 0.0;
+    machine.actuator.coulomb_friction = [0.0; 6];
     machine
 }
 

@@ -74,7 +74,8 @@ fn holding(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
 /// Drives that only push.
 fn without_drives(mut machine: Machine) -> Machine {
     let actuator = &mut machine.actuator;
-    (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) = (0.0, 0.0, 0.0);
+    (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) =
+        (0.0, [0.0; 6], [0.0; 6]);
     machine
 }
 

@@ -101,8 +101,10 @@ fn any_machine() -> impl Strategy<Value = Machine> {
             machine.rod = heavier(&machine.rod, rod, links[1], links[3]);
             let mass = machine.platform.mass;
             machine.actuator.reflected_mass = 0.3 * mass * drive[0];
-            machine.actuator.viscous_friction = mass * drive[1];
-            machine.actuator.coulomb_friction = mass * drive[2];
+            machine.actuator.viscous_friction =
+                core::array::from_fn(|leg| mass * drive[1] * (1.0 + 0.1 * leg as f64));
+            machine.actuator.coulomb_friction =
+                core::array::from_fn(|leg| mass * drive[2] * (1.0 - 0.1 * leg as f64));
             machine
         },
     )

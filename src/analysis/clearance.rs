@@ -183,7 +183,7 @@ impl<'a> Clearance<'a> {
     }
 
     fn holding_force(&self) -> f64 {
-        MAX_HOLDING_SHARE * self.machine.actuator.max_force
+        MAX_HOLDING_SHARE * self.machine.actuator.available_force()
     }
 
     /// Whether a proof exists that in a cell no leg is near the first axis of its universal joint, and that the drives can hold

@@ -24,7 +24,7 @@ use crate::model::rigid::Pose;
 /// use hexad::analysis::drive_capability::DriveCapability;
 /// # let machine = hexad::config::Config::load("config/motion_base.toml".as_ref()).unwrap().machine;
 /// let drives = DriveCapability::new(&machine, &machine.home_pose()).unwrap();
-/// let force = machine.actuator.max_force;
+/// let force = machine.actuator.available_force();
 /// // What one acceleration takes, the other lacks.
 /// assert!(drives.angular_acceleration(force, 5.0) < drives.angular_acceleration(force, 0.0));
 /// assert!(drives.hardest_held().1 < force);
@@ -63,10 +63,11 @@ impl DriveCapability {
         let norms = |a: &Vector6<f64>, b: &Vector6<f64>, c: &Vector6<f64>| -> [f64; LEGS] {
             (a.component_mul(a) + b.component_mul(b) + c.component_mul(c)).map(f64::sqrt).into()
         };
-        let mut loads = found.holding(machine).map(|force| LegLoad {
-            holding: force.abs() + machine.actuator.coulomb_friction,
-            ..LegLoad::default()
-        });
+        let mut loads = [LegLoad::default(); LEGS];
+        let holding = found.holding(machine).into_iter().zip(&machine.actuator.coulomb_friction);
+        for (load, (force, friction)) in loads.iter_mut().zip(holding) {
+            load.holding = force.abs() + friction;
+        }
         let directions = norms(&ax, &ay, &az).into_iter().zip(norms(&x, &y, &z));
         for (load, (angular, linear)) in loads.iter_mut().zip(directions) {
             (load.angular, load.linear) = (angular, linear);

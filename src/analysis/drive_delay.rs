@@ -106,7 +106,8 @@ type Terms = SVector<f64, TERMS>;
 /// Delay of the drives of a machine from a recorded motion; `None` if too little was recorded, or it does not move enough.
 pub fn drive_delay(machine: &Machine, stretches: &[RecordedStretch]) -> Option<DriveDelay> {
     let mut frictionless = machine.clone();
-    (frictionless.actuator.coulomb_friction, frictionless.actuator.viscous_friction) = (0.0, 0.0);
+    (frictionless.actuator.coulomb_friction, frictionless.actuator.viscous_friction) =
+        ([0.0; LEGS], [0.0; LEGS]);
     let model = InverseDynamics::new(&frictionless);
     let recorded: Vec<_> = stretches.iter().map(|stretch| Instants::new(&model, stretch)).collect();
     let count = recorded.iter().map(|recorded| recorded.instants.len()).sum::<usize>();

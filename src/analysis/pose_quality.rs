@@ -111,7 +111,9 @@ impl PoseEvaluator {
         let worst =
             |legs: [LegForceBound; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
         let payload = |legs: [LegForceBound; LEGS]| {
-            legs.iter().map(|leg| leg.payload(machine.actuator.max_force)).fold(f64::INFINITY, f64::min)
+            legs.iter()
+                .map(|leg| leg.payload(machine.actuator.available_force()))
+                .fold(f64::INFINITY, f64::min)
         };
         PoseQuality {
             stroke_margin: kinematic_state
@@ -148,10 +150,11 @@ impl PoseEvaluator {
             matrix.fixed_view::<1, 3>(leg, first).into()
         };
         let mut legs = [LegForceBound::default(); LEGS];
-        for (i, (leg, (own, added))) in legs.iter_mut().zip(still.iter().zip(&still_mass)).enumerate() {
+        let rest = still.iter().zip(&still_mass).zip(machine.actuator.coulomb_friction);
+        for (i, (leg, ((own, added), friction))) in legs.iter_mut().zip(rest).enumerate() {
             let pair = |first| [row(&of_machine, i, first), row(&of_mass, i, first)];
             *leg = LegForceBound {
-                friction: machine.actuator.coulomb_friction,
+                friction,
                 still: [*own, *added],
                 angular: pair(0).map(|row| row * self.demand.angular),
                 linear: pair(3).map(|row| row * self.demand.linear),

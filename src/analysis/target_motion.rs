@@ -182,7 +182,7 @@ pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBoun
     let drives = DriveCapability::of(&constants.dynamics, pose).map(|drives| drives.hardest_held());
     let (leg, force) = drives.unwrap_or((0, f64::INFINITY));
     let (quantity, bound) =
-        (BoundedQuantity::HoldingForce(leg), MAX_HOLDING_SHARE * machine.actuator.max_force);
+        (BoundedQuantity::HoldingForce(leg), MAX_HOLDING_SHARE * machine.actuator.available_force());
     bounds.push(WorkspaceBound { quantity, value: force, bound, margin: bound - force });
     bounds
 }

@@ -23,6 +23,11 @@ const FRICTION_UNCERTAINTY: &str = "friction_uncertainty_n";
 const USUAL_FRICTION_PER_MAX_FORCE: f64 = 0.03;
 const USUAL_FRICTION_PER_HOLDING: f64 = 0.2;
 
+/// Largest load friction: of a lead screw that hardly turns under load.
+const MAX_LOAD_FRICTION: f64 = 0.8;
+/// A drive that gives less than half or more than twice of what it is told has a wrong unit.
+const FORCE_SCALE_BOUND: Bound = Bound::Within(0.5, 2.0);
+
 /// Relative tolerance of the triangle inequalities: a flat plate and a thin disc meet them with equality,
 /// and the digits of a file round them to either side.
 const INERTIA_TOLERANCE: f64 = 1e-9;
@@ -105,7 +110,8 @@ fn usual_friction_uncertainty(machine: &Machine) -> f64 {
     let at_home = TaskState::at_rest(machine.home).motion();
     let held = InverseDynamics::new(machine).forces_of(Fidelity::Gravity, &at_home).unwrap_or_default();
     let largest = held.into_iter().map(f64::abs).fold(0.0, f64::max);
-    (USUAL_FRICTION_PER_MAX_FORCE * machine.actuator.max_force).min(USUAL_FRICTION_PER_HOLDING * largest)
+    (USUAL_FRICTION_PER_MAX_FORCE * machine.actuator.available_force())
+        .min(USUAL_FRICTION_PER_HOLDING * largest)
 }
 
 fn actuator(mut section: SectionReader) -> Actuator {
@@ -115,8 +121,10 @@ fn actuator(mut section: SectionReader) -> Actuator {
         max_rate: section.number("max_rate_m_s", Bound::Positive),
         max_force: section.number("max_force_n", Bound::Positive),
         reflected_mass: section.number_or("reflected_mass_kg", 0.0, Bound::NotNegative),
-        viscous_friction: section.number_or("viscous_friction_n_s_m", 0.0, Bound::NotNegative),
-        coulomb_friction: section.number_or("coulomb_friction_n", 0.0, Bound::NotNegative),
+        viscous_friction: section.per_leg_or("viscous_friction_n_s_m", 0.0, Bound::NotNegative),
+        coulomb_friction: section.per_leg_or("coulomb_friction_n", 0.0, Bound::NotNegative),
+        load_friction: section.per_leg_or("load_friction", 0.0, Bound::Within(0.0, MAX_LOAD_FRICTION)),
+        force_scale: section.per_leg_or("force_scale", 1.0, FORCE_SCALE_BOUND),
         friction_uncertainty: section.number_or(FRICTION_UNCERTAINTY, 0.0, Bound::NotNegative),
         coulomb_smoothing: Actuator::COULOMB_SMOOTHING_M_S,
     };

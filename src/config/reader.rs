@@ -13,6 +13,7 @@ use toml::de::{DeTable, DeValue};
 use super::bound::{Bound, integer, number};
 use super::nearest::nearest;
 use super::{MAX_VIOLATIONS, Violation};
+use crate::model::LEGS;
 use crate::output::excerpt::excerpt;
 
 /// Log of the violations in a text, shared by the readers of all its sections.
@@ -92,6 +93,19 @@ impl<'t> SectionReader<'t> {
     pub fn number_or(&mut self, key: &'static str, default: f64, bound: Bound) -> f64 {
         let found = self.find(key, Some(default.to_string()));
         found.map_or(default, |value| self.checked(self.key(key), value, bound))
+    }
+
+    /// A number for all legs, or an array with one per leg; with a default.
+    pub fn per_leg_or(&mut self, key: &'static str, default: f64, bound: Bound) -> [f64; LEGS] {
+        let Some(value) = self.find(key, Some(default.to_string())) else { return [default; LEGS] };
+        match value.get_ref() {
+            DeValue::Array(items) if items.len() == LEGS => self.components(key, value, &[bound; LEGS]),
+            DeValue::Integer(_) | DeValue::Float(_) => [self.checked(self.key(key), value, bound); LEGS],
+            _ => {
+                self.reject(key, format!("must be a number, or an array of {LEGS} numbers, one per leg"));
+                [f64::NAN; LEGS]
+            }
+        }
     }
 
     /// An optional integer in `[low, high]`.

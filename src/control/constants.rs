@@ -17,7 +17,7 @@ use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 
-/// Largest force that holding the platform may take, as a share of `actuator.max_force_n`: in the envelope, and
+/// Largest force that holding the platform may take, as a share of the force that every leg can get: in the envelope, and
 /// wherever the reference goes. The rest is for motion, friction and feedback.
 pub const MAX_HOLDING_SHARE: f64 = 0.9;
 /// Share of the range from the condition at home to its limit that the reference may use.
@@ -81,8 +81,11 @@ impl Constants {
             parameters.law.max_leg_acceleration_without_feedforward(&limits, arm, &disturbance);
         let angle_weighting_radius_m = if mode.acts_on_legs() { 1.0 } else { arm };
         let by_force = acceleration_by_command.acceleration_by_force(machine, home.pose());
-        let least_missing =
-            least_missing_force_acceleration(&by_force, angle_weighting_radius_m, machine.actuator.max_force);
+        let least_missing = least_missing_force_acceleration(
+            &by_force,
+            angle_weighting_radius_m,
+            machine.actuator.available_force(),
+        );
         let least_missing_acceleration_squared =
             if mode.includes_inertia() { least_missing * least_missing } else { f64::INFINITY };
         let unbounded = Vector6::repeat(f64::INFINITY);

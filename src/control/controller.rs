@@ -202,7 +202,7 @@ impl Controller {
                 supervisor.fail(diagnostic);
             }
         }
-        drives.record_sent(&limited.force);
+        drives.record_sent(&limited.command);
 
         let mut output = Output::new(supervisor, &limited, error);
         output.active_limits = active_limits.union(reference.active_limits()).union(limited.active_limits);
@@ -219,7 +219,7 @@ impl Output {
     /// Output of a state, without the motions of platform and reference, and without counts.
     #[inline(always)]
     fn new(supervisor: &Supervisor, limited: &LimitedForces, error: Option<PoseError>) -> Self {
-        let LimitedForces { force, wrench_error, active_limits } = *limited;
+        let LimitedForces { command: force, wrench_error, active_limits } = *limited;
         Self {
             state: supervisor.current.state,
             diagnostic: supervisor.current.diagnostic,

@@ -23,7 +23,7 @@ use super::fidelity::{
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
 use super::leg::{JointForces, LegConstants, LegReaction};
-use super::machine::{Actuator, Joints, Machine};
+use super::machine::{Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
 use super::triples::LegLanes;
@@ -47,6 +47,9 @@ pub struct InverseDynamics {
     joints: Joints,
     legs: LegConstants,
     axes: PrincipalAxes,
+    /// Viscous and Coulomb friction of the legs.
+    viscous_friction: LegLanes,
+    coulomb_friction: LegLanes,
     /// Inverse of the smoothing speed of Coulomb friction \[s/m\].
     inverse_smoothing: f64,
 }
@@ -72,11 +75,14 @@ impl TaskLoad {
 impl InverseDynamics {
     /// Computes the constants of the model. Not for the cycle: it decomposes the inertia tensor.
     pub fn new(machine: &Machine) -> Self {
+        let (actuator, triples) = (&machine.actuator, &machine.joints.triples);
         Self {
             joints: machine.joints.with_point(&machine.platform.center_of_mass),
             legs: LegConstants::new(machine),
             axes: PrincipalAxes::new(machine),
-            inverse_smoothing: 1.0 / machine.actuator.coulomb_smoothing,
+            viscous_friction: triples.pack(&actuator.viscous_friction),
+            coulomb_friction: triples.pack(&actuator.coulomb_friction),
+            inverse_smoothing: 1.0 / actuator.coulomb_smoothing,
             machine: machine.clone(),
         }
     }
@@ -186,12 +192,12 @@ impl InverseDynamics {
     /// smoothing speed.
     #[inline(always)]
     fn drive_force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
-        let Actuator { reflected_mass, viscous_friction, coulomb_friction, .. } = self.machine.actuator;
         let splat = |value: f64| f64x8::splat(simd, value);
         let one = splat(1.0);
         let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
-        let friction = splat(viscous_friction).fused_mul_add(rate, splat(coulomb_friction) * sign);
-        splat(reflected_mass).fused_mul_add(accel, friction)
+        let friction =
+            self.viscous_friction.load(simd).fused_mul_add(rate, self.coulomb_friction.load(simd) * sign);
+        splat(self.machine.actuator.reflected_mass).fused_mul_add(accel, friction)
     }
 }
 

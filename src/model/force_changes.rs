@@ -116,8 +116,8 @@ impl ForceChangeBounds {
             ],
             axial_mass,
             axial_weight: machine.rod.mass * g,
-            viscous_friction: actuator.viscous_friction,
-            coulomb_friction: actuator.coulomb_friction,
+            viscous_friction: actuator.largest_viscous_friction(),
+            coulomb_friction: actuator.largest_coulomb_friction(),
             max_rate: actuator.max_rate,
             arm,
         }

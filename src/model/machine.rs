@@ -209,14 +209,18 @@ pub struct Actuator {
     pub max_length: f64,
     /// Largest speed of the leg \[m/s\].
     pub max_rate: f64,
-    /// Largest force \[N\].
+    /// Largest command \[N\].
     pub max_force: f64,
     /// Inertia of motor and screw, seen along the leg \[kg\].
     pub reflected_mass: f64,
-    /// Viscous friction \[N s/m\].
-    pub viscous_friction: f64,
-    /// Coulomb friction \[N\].
-    pub coulomb_friction: f64,
+    /// Viscous friction of each leg \[N s/m\].
+    pub viscous_friction: [f64; LEGS],
+    /// Coulomb friction of each leg \[N\].
+    pub coulomb_friction: [f64; LEGS],
+    /// Friction of each leg as a share of the force of its drive.
+    pub load_friction: [f64; LEGS],
+    /// Real over commanded force of each drive.
+    pub force_scale: [f64; LEGS],
     /// Largest dry friction that the model may lack \[N\]. The checks under control permit it.
     pub friction_uncertainty: f64,
     /// Speed above which the Coulomb force has its full value \[m/s\]; below it the force is proportional to
@@ -228,6 +232,35 @@ impl Actuator {
     /// Value of `coulomb_smoothing` for controllers. sign(L') is exact above 0.1 mm/s, which is slow enough
     /// for the legs of a telescope. One count of a usual encoder at 1 kHz does not make the force chatter.
     pub const COULOMB_SMOOTHING_M_S: f64 = 1e-4;
+
+    /// Force that every leg can get, whichever way it moves \[N\]: that of the weakest drive, less load friction. A
+    /// machine is as strong as its weakest leg; the others differ by a few percent.
+    pub fn available_force(&self) -> f64 {
+        let share = |(scale, load_friction): (&f64, &f64)| scale * (1.0 - load_friction);
+        self.max_force
+            * self.force_scale.iter().zip(&self.load_friction).map(share).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether legs get other forces than their drives are told.
+    pub fn transmits_otherwise(&self) -> bool {
+        self.force_scale != [1.0; LEGS] || self.load_friction != [0.0; LEGS]
+    }
+
+    /// Largest viscous friction of a leg \[N s/m\].
+    pub fn largest_viscous_friction(&self) -> f64 {
+        self.viscous_friction.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Largest Coulomb friction of a leg \[N\].
+    pub fn largest_coulomb_friction(&self) -> f64 {
+        self.coulomb_friction.into_iter().fold(0.0, f64::max)
+    }
+
+    /// sign(L') of dry friction, proportional to L' below the smoothing speed.
+    pub fn sign(&self, rate: f64) -> f64 {
+        // Not `clamp`, which may panic.
+        (rate / self.coulomb_smoothing).max(-1.0).min(1.0)
+    }
 
     /// Length of the stroke \[m\].
     pub fn stroke(&self) -> f64 {

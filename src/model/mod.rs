@@ -13,7 +13,7 @@
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
 //! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], |
-//! | | [`drive_loads`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu` |
+//! | | [`drive_loads`], [`transmission`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu` |
 //!
 //! # Errata of the print
 //!
@@ -58,6 +58,7 @@ pub mod regressor;
 pub mod rigid;
 pub mod sensitivity;
 pub mod task;
+pub mod transmission;
 pub mod triples;
 
 /// Number of legs.

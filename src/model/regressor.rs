@@ -17,7 +17,7 @@
 //!     q1, q2    Q = (L - l0)^2 n''                    along = 0
 //!     Ix1, Ix2  Q = ( wx n' + (un / yy) wx' y ) x n   along = 0
 //!
-//! Y = N^-1 (these wrenches)      and for the drives   L'', L', sign(L')   in the row of the leg
+//! Y = N^-1 (these wrenches)      and for the drives   L'' in all rows, L' and sign(L') of leg i in row i
 //! ```
 //!
 //! This is the expansion of [`super::leg`] and [`super::platform`] in the parameters. Both are linear if J1
@@ -26,7 +26,7 @@
 //!
 //! The mass of the cylinder is not a parameter: A does not move, so only `m1 e1` and `J1` have an effect.
 //!
-//! At most 19 of the 22 parameters are identifiable (18 if both links have the same reference length, because
+//! At most 29 of the 32 parameters are identifiable (28 if both links have the same reference length, because
 //! q1 and q2 then have the same effect). No motion distinguishes
 //!
 //! - `J1` from `J2`, and `Ix1` from `Ix2`: the links turn together, so only the sums have an effect;
@@ -40,15 +40,23 @@
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
+use super::LEGS;
 use super::inverse_geometry::{LegMotion, leg_directions, leg_motion};
 use super::inverse_jacobian::leg_wrenches;
 use super::leg::MIN_UNIVERSAL_SINE_SQUARED;
-use super::machine::{Actuator, Machine};
+use super::machine::Machine;
 use super::platform::acceleration_map;
 use super::rigid::Motion;
 
 /// Number of parameters.
-pub const PARAMETER_COUNT: usize = 22;
+pub const PARAMETER_COUNT: usize = 32;
+
+/// The drives' reflected mass.
+pub const REFLECTED: usize = 19;
+/// First of the six parameters of viscous friction.
+pub const VISCOUS: usize = 20;
+/// First of the six parameters of Coulomb friction.
+pub const COULOMB: usize = VISCOUS + LEGS;
 
 /// Inertial and friction parameters p of a machine, in this order:
 ///
@@ -67,11 +75,11 @@ pub const PARAMETER_COUNT: usize = 22;
 /// | 17 | axial inertia Ix2 | kg m^2 |
 /// | 18 | quadratic part q2 of the transverse inertia | kg |
 /// | 19 | drive: reflected mass | kg |
-/// | 20 | viscous friction | N s/m |
-/// | 21 | Coulomb friction | N |
+/// | 20-25 | viscous friction of leg 1 to 6 | N s/m |
+/// | 26-31 | Coulomb friction of leg 1 to 6 | N |
 pub type InertialParameters = SVector<f64, PARAMETER_COUNT>;
 
-/// Regressor matrix Y, 6 x 22: one row per leg in the order 1..6, one column per parameter, \[N\] per unit of
+/// Regressor matrix Y, 6 x 32: one row per leg in the order 1..6, one column per parameter, \[N\] per unit of
 /// parameter.
 pub type Regressor = SMatrix<f64, 6, PARAMETER_COUNT>;
 
@@ -85,7 +93,7 @@ pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
     let moment = platform.center_of_mass * platform.mass;
     let inertia = platform.inertia + point_inertia(&platform.center_of_mass) * platform.mass;
     let (m1_e1, m2_e2) = (cylinder.mass * cylinder.center_of_mass, rod.mass * rod.center_of_mass);
-    SVector::from([
+    let bodies = [
         platform.mass,
         moment.x,
         moment.y,
@@ -106,9 +114,9 @@ pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
         rod.axial_inertia,
         rod.transverse_inertia.quadratic,
         actuator.reflected_mass,
-        actuator.viscous_friction,
-        actuator.coulomb_friction,
-    ])
+    ];
+    let friction = actuator.viscous_friction.into_iter().chain(actuator.coulomb_friction);
+    SVector::from_iterator(bodies.into_iter().chain(friction))
 }
 
 /// Direction of p in the null space of Y at every motion. Each rod is 1 kg heavier with the same `m2 e2` and
@@ -172,14 +180,10 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     }
 
     let mut forces = leg_wrenches(machine, &motion.pose).lu().solve(&wrenches)?;
-    let drives = [
-        Vector6::from(accel),
-        Vector6::from(rate),
-        Vector6::from(rate.map(|rate| smooth_sign(&machine.actuator, rate))),
-    ];
-    for (mut column, drive) in forces.columns_mut(19, 3).column_iter_mut().zip(&drives) {
-        column.copy_from(drive);
-    }
+    forces.set_column(REFLECTED, &Vector6::from(accel));
+    forces.fixed_view_mut::<6, 6>(0, VISCOUS).set_diagonal(&Vector6::from(rate));
+    let signs = Vector6::from(rate.map(|rate| machine.actuator.sign(rate)));
+    forces.fixed_view_mut::<6, 6>(0, COULOMB).set_diagonal(&signs);
     Some(forces)
 }
 
@@ -263,11 +267,6 @@ impl LegKinematics {
         let wx_rate = (un_rate * p + un * p_rate + 2.0 * un * un_rate * wx) / yy;
         n_rate.cross(n) * wx + k * (un / yy * wx_rate)
     }
-}
-
-/// sign(L'), proportional to L' below the smoothing speed.
-fn smooth_sign(actuator: &Actuator, rate: f64) -> f64 {
-    (rate / actuator.coulomb_smoothing).clamp(-1.0, 1.0)
 }
 
 /// Inertia of a point of 1 kg about the origin: `|r|^2 - r r^T`.

@@ -198,6 +198,6 @@ fn has_reserve(model: &InverseDynamics, fitted: &FittedMotion) -> bool {
         let force = model.forces::<Exact>(&motion);
         legs.length.iter().all(|length| stroke.contains(length))
             && legs.rate.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate)
-            && force.is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.max_force))
+            && force.is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.available_force()))
     })
 }

@@ -24,9 +24,13 @@ use super::forward_dynamics::ForwardDynamics;
 use super::imperfections::{ElasticLeg, ExternalWrench, Friction, Imperfections};
 use super::integrator::{Accelerations, PlantState};
 use crate::model::LEGS;
+use crate::model::active_forces::inverse_dynamics;
+use crate::model::fidelity::Gravity;
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::machine::{Actuator, Machine};
 use crate::model::rigid::{Acceleration, Motion};
+use crate::model::task::TaskState;
+use crate::model::transmission::Transmission;
 
 /// Longest step times rate, whatever the tolerance: Runge-Kutta is stable to 2.78, and 1 is also accurate.
 const MAX_STEP_TIMES_RATE: f64 = 1.0;
@@ -40,8 +44,8 @@ pub struct PlantTerms {
     pub elastic: Option<(ElasticLeg, f64)>,
     /// Step of the integration \[s\].
     pub step: f64,
-    /// Where legs are rigid, the friction that the machine does not have; else all of it.
-    friction: Friction,
+    /// Friction of each leg: where legs are rigid, what the machine does not have; else all of it.
+    friction: [Friction; LEGS],
     /// Speed below which the sign of dry friction is proportional \[m/s\].
     smoothing: f64,
     external: ExternalWrench,
@@ -55,7 +59,8 @@ impl PlantTerms {
         let least_mass = |machine: &Machine| {
             ForwardDynamics::new(machine).smallest_leg_mass(&machine.home_pose()).unwrap_or(f64::NAN)
         };
-        let dry = wanted.friction.dry() + actuator.coulomb_friction;
+        let dry =
+            wanted.friction.dry() + actuator.largest_coulomb_friction() + held_by_load_friction(machine);
         let depends = wanted.drive.bandwidth_hz.is_some() || wanted.leg.is_some() || wanted.friction.any();
         let leg_mass = if depends || dry > 0.0 { least_mass(machine) } else { f64::NAN };
         let drive_mass = actuator.reflected_mass;
@@ -66,14 +71,17 @@ impl PlantTerms {
 
         let deflection = |spring: &ElasticLeg| actuator.max_force / spring.stiffness + 0.5 * spring.backlash;
         let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance);
-        let mut friction = wanted.friction;
+        let mut friction = [wanted.friction; LEGS];
         let mut moved = leg_mass;
         if let Some(spring) = spring {
             let compliance = 1.0 / drive_mass + 1.0 / least_mass(&without_drives(machine));
             let rate = (spring.stiffness * compliance).sqrt().max(spring.damping * compliance);
             limit(rate, deflection(&spring), 120.0 / core::f64::consts::TAU);
-            friction.viscous += actuator.viscous_friction;
-            friction.coulomb += actuator.coulomb_friction;
+            let own = actuator.viscous_friction.iter().zip(&actuator.coulomb_friction);
+            for (friction, (viscous, coulomb)) in friction.iter_mut().zip(own) {
+                friction.viscous += viscous;
+                friction.coulomb += coulomb;
+            }
             moved = drive_mass;
         }
         let way = |rate: f64| actuator.max_force / (moved * rate * rate);
@@ -82,8 +90,9 @@ impl PlantTerms {
         if let Some(rate) = lag {
             limit(rate, way(rate), 2880.0);
         }
-        if friction.viscous > 0.0 {
-            step = step.min(MAX_STEP_TIMES_RATE * moved / friction.viscous);
+        let viscous = friction.iter().map(|friction| friction.viscous).fold(0.0, f64::max);
+        if viscous > 0.0 {
+            step = step.min(MAX_STEP_TIMES_RATE * moved / viscous);
         }
         Self {
             lag,
@@ -104,7 +113,7 @@ impl PlantTerms {
         if self.elastic.is_some() { without_drives(&simulated) } else { simulated }
     }
 
-    /// Forces of the drives \[N\] a `time` after `command`, from the forces `before` it.
+    /// Forces of the drives \[N\], as they know them, a `time` after `command`, from the forces `before` it.
     pub fn push(&self, before: &[f64; LEGS], command: &[f64; LEGS], time: f64) -> [f64; LEGS] {
         let Some(rate) = self.lag else { return *command };
         let share = (-rate * time).exp();
@@ -124,21 +133,26 @@ impl PlantTerms {
         time: f64,
     ) -> Option<Accelerations> {
         let PlantState { platform, drives } = state;
+        let actuator = &dynamics.machine().actuator;
         let mut force = *push;
         let mut drives_accelerate = Vector6::zeros();
         if let Some((spring, drive_mass)) = self.elastic {
             let LegMotion { length, rate, .. } = legs(dynamics.machine(), state);
+            force = Transmission::new(actuator, drives.rate.as_ref()).leg_forces(push);
             let on_drives = drives.length.iter().zip(&drives.rate).zip(&mut drives_accelerate);
-            let on_rods = force.iter_mut().zip(length.iter().zip(&rate));
-            for ((force, (length, rate)), ((drive, drive_rate), accelerates)) in on_rods.zip(on_drives) {
+            let on_rods = force.iter_mut().zip(&self.friction).zip(length.iter().zip(&rate));
+            for (((force, friction), (length, rate)), ((drive, drive_rate), accelerates)) in
+                on_rods.zip(on_drives)
+            {
                 let tension = spring.force(drive - length, drive_rate - rate);
-                *accelerates =
-                    (*force - self.friction.force(*drive_rate, self.smoothing) - tension) / drive_mass;
+                *accelerates = (*force - friction.force(*drive_rate, self.smoothing) - tension) / drive_mass;
                 *force = tension;
             }
-        } else if self.friction.any() {
-            for (force, rate) in force.iter_mut().zip(legs(dynamics.machine(), state).rate) {
-                *force -= self.friction.force(rate, self.smoothing);
+        } else if actuator.transmits_otherwise() || self.friction.iter().any(Friction::any) {
+            let rates = legs(dynamics.machine(), state).rate;
+            force = Transmission::new(actuator, &rates).leg_forces(push);
+            for ((force, friction), rate) in force.iter_mut().zip(&self.friction).zip(rates) {
+                *force -= friction.force(rate, self.smoothing);
             }
         }
         let wrench = self.external.at(time);
@@ -154,9 +168,18 @@ pub(super) fn legs(machine: &Machine, state: &PlantState) -> LegMotion {
     LegMotion { accel: [0.0; LEGS], ..leg_motion(machine, &motion) }
 }
 
+/// Largest load friction of a leg that holds the platform at home \[N\].
+fn held_by_load_friction(machine: &Machine) -> f64 {
+    let home = TaskState::at_rest(machine.home).motion();
+    let held = inverse_dynamics::<Gravity>(machine, &home).unwrap_or_default();
+    let legs = held.iter().zip(&machine.actuator.load_friction);
+    legs.map(|(force, load_friction)| force.abs() * load_friction).fold(0.0, f64::max)
+}
+
 fn without_drives(machine: &Machine) -> Machine {
     let mut bare = machine.clone();
     let actuator = &mut bare.actuator;
-    (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) = (0.0, 0.0, 0.0);
+    (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) =
+        (0.0, [0.0; LEGS], [0.0; LEGS]);
     bare
 }

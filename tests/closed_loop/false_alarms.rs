@@ -43,9 +43,9 @@ fn episode(seed: u64, duration_s: f64) -> Result<(), String> {
         ),
     );
     let most = config.machine.actuator.max_force;
-    config.machine.actuator.coulomb_friction = modelled * most;
+    config.machine.actuator.coulomb_friction = [modelled * most; 6];
     let mut platform = config.machine.clone();
-    platform.actuator.coulomb_friction = 0.0;
+    platform.actuator.coulomb_friction = [0.0; 6];
     let imperfections = Imperfections {
         seed,
         drive: DriveErrors { dead_time_ns: (1e3 * (delay_us - 100.0)) as u64, ..DriveErrors::default() },

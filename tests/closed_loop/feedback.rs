@@ -29,7 +29,8 @@ fn sensitive(name: &str, mode: ControlMode, acceleration: f64) -> Config {
     config.deployment.control.mode = mode;
     config.machine.actuator.max_force = 1e9;
     // No force for the estimated velocity, which the shoves of these tests have not.
-    (config.machine.actuator.viscous_friction, config.machine.actuator.coulomb_friction) = (0.0, 0.0);
+    (config.machine.actuator.viscous_friction, config.machine.actuator.coulomb_friction) =
+        ([0.0; 6], [0.0; 6]);
     let limits = &mut config.deployment.limits;
     limits.force_rate_n_s = 1e12;
     limits.reference.position.acceleration = acceleration;

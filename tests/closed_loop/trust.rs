@@ -122,9 +122,9 @@ fn certificate_sensors_that_freeze_in_motion_end_the_forces_before_the_platform_
 fn settled(model: f64, plant: f64, stiction: f64) -> f64 {
     let mut config = config("motion_base");
     let force = config.machine.actuator.max_force;
-    config.machine.actuator.coulomb_friction = model * force;
+    config.machine.actuator.coulomb_friction = [model * force; 6];
     let mut platform = config.machine.clone();
-    platform.actuator.coulomb_friction = 0.0;
+    platform.actuator.coulomb_friction = [0.0; 6];
     let mut imperfections = Imperfections::default();
     (imperfections.friction.coulomb, imperfections.friction.stiction) = (plant * force, stiction * force);
     let mut control = HardwareLoop::new(&config, &platform, &imperfections);

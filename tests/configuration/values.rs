@@ -100,6 +100,21 @@ fn single_values_are_refused_with_key_value_and_bound() {
             &format!("actuator.{key} = -1e-3: must be at least 0"),
         );
     }
+    refused(
+        "max_force_n = 500.0\n",
+        "max_force_n = 500.0\nforce_scale = [1, 1, 1, 1, 1, 0.4]\n",
+        "actuator.force_scale[6] = 0.4: must be in [0.5, 2]",
+    );
+    refused(
+        "max_force_n = 500.0\n",
+        "max_force_n = 500.0\nload_friction = [0.1, 0.1]\n",
+        "actuator.load_friction = [0.1, 0.1]: must be a number, or an array of 6 numbers, one per leg",
+    );
+    refused(
+        "max_force_n = 500.0\n",
+        "max_force_n = 500.0\nload_friction = 1\n",
+        "actuator.load_friction = 1: must be in [0, 0.8]",
+    );
     refused("xx = 0.375,", "xx = 0,", "platform.inertia_kg_m2.xx = 0: must be greater than 0");
     refused(
         "[cylinder]\nmass_kg = 0.5\ncenter_of_mass_m = 0.15",
@@ -122,7 +137,7 @@ fn keys_are_refused_when_missing_unknown_or_of_the_wrong_shape() {
         "min_length_m = 0.85\nmin_lenght_m = 0.85",
         "actuator.min_lenght_m = 0.85: unknown key, probably min_length_m, must be one of: min_length_m, \
          max_length_m, max_rate_m_s, max_force_n, reflected_mass_kg, viscous_friction_n_s_m, coulomb_friction_n, \
-         friction_uncertainty_n",
+         load_friction, force_scale, friction_uncertainty_n",
     );
     refused(
         "reference_length_m = 0.83 }",

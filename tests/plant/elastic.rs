@@ -20,7 +20,7 @@ fn elastic(spring: ElasticLeg) -> Imperfections {
 /// A machine without friction.
 fn smooth(name: &str) -> Machine {
     let mut machine = machine(name);
-    (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = (0.0, 0.0);
+    (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
     machine
 }
 
@@ -126,7 +126,7 @@ fn play_separates_drive_and_platform() {
 #[test]
 fn a_stiff_leg_is_nearly_rigid() {
     let mut machine = machine("motion_base");
-    machine.actuator.coulomb_friction = 100.0;
+    machine.actuator.coulomb_friction = [100.0; 6];
     let friction = Friction { viscous: 700.0, coulomb: 50.0, ..Friction::default() };
     let run = |leg| {
         let wanted = Imperfections { friction, leg, ..Imperfections::default() };

@@ -33,7 +33,7 @@ fn dry_friction_takes_energy_and_nothing_chatters() {
     {
         let mut machine = machine(name);
         machine.gravity.fill(0.0);
-        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = (0.0, coulomb);
+        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [coulomb; 6]);
         // The energy of a rod whose inertia varies is not conserved to begin with.
         machine.rod.transverse_inertia.quadratic = 0.0;
         let energies = coasting(&machine, 2.0);
@@ -52,10 +52,10 @@ fn dry_friction_takes_energy_and_nothing_chatters() {
 fn dry_friction_holds() {
     let mut machine = machine("scattered");
     machine.gravity.fill(0.0);
-    machine.actuator.viscous_friction = 0.0;
+    machine.actuator.viscous_friction = [0.0; 6];
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
     let smoothing = simulator.machine().actuator.coulomb_smoothing;
-    let half = 0.5 * machine.actuator.coulomb_friction;
+    let half = 0.5 * machine.actuator.largest_coulomb_friction();
     for _ in 0..1000 {
         simulator.advance(1e-3, Some(&[half, -half, half, half, -half, -half]));
         let fastest = super::common::largest(&simulator.leg_motion().rate);
@@ -73,7 +73,7 @@ fn viscous_friction_dissipates_what_it_should() {
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
     simulator.advance(0.2, Some(&[300.0; 6]));
     let start = energy(&machine, simulator.state()).kinetic;
-    let (mut dissipated, c) = (0.0, machine.actuator.viscous_friction);
+    let (mut dissipated, c) = (0.0, machine.actuator.largest_viscous_friction());
     let power =
         |simulator: &Simulator| simulator.leg_motion().rate.iter().map(|rate| c * rate * rate).sum::<f64>();
     for _ in 0..400 {
@@ -86,4 +86,41 @@ fn viscous_friction_dissipates_what_it_should() {
     }
     let lost = start - energy(&machine, simulator.state()).kinetic;
     assert!(lost > 0.1 * start && (lost / dissipated - 1.0).abs() < 1e-9, "{lost} {dissipated}");
+}
+
+/// Load friction alone: what the drives put in, less its share, becomes kinetic energy. The commands are not the forces.
+#[test]
+fn load_friction_takes_its_share_of_the_drives_power() {
+    const COMMAND: [f64; 6] = [300.0, -200.0, 100.0, 250.0, -300.0, 150.0];
+    const FORCE_SCALE: [f64; 6] = [0.9, 1.1, 1.0, 0.8, 1.2, 1.05];
+    const LOAD_FRICTION: [f64; 6] = [0.3, 0.1, 0.0, 0.2, 0.05, 0.25];
+    let mut machine = machine("motion_base");
+    machine.gravity.fill(0.0);
+    let actuator = &mut machine.actuator;
+    (actuator.viscous_friction, actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
+    (actuator.force_scale, actuator.load_friction) = (FORCE_SCALE, LOAD_FRICTION);
+    let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
+    // Every leg is faster than the smoothing speed from here on.
+    simulator.advance(0.05, Some(&COMMAND));
+    let start = energy(&machine, simulator.state()).kinetic;
+    let power = |simulator: &Simulator| {
+        let rates = simulator.leg_motion().rate;
+        assert!(rates.iter().all(|rate| rate.abs() > 1e-3), "{rates:?}");
+        (0..6)
+            .map(|leg| {
+                let force = FORCE_SCALE[leg] * COMMAND[leg];
+                force * rates[leg] - LOAD_FRICTION[leg] * (force * rates[leg]).abs()
+            })
+            .sum::<f64>()
+    };
+    let mut put_in = 0.0;
+    for _ in 0..400 {
+        let before = power(&simulator);
+        simulator.advance(DEFAULT_STEP_S, Some(&COMMAND));
+        let middle = power(&simulator);
+        simulator.advance(DEFAULT_STEP_S, Some(&COMMAND));
+        put_in += (before + 4.0 * middle + power(&simulator)) * DEFAULT_STEP_S / 3.0;
+    }
+    let gained = energy(&machine, simulator.state()).kinetic - start;
+    assert!(gained > start && (gained / put_in - 1.0).abs() < 1e-9, "{gained} {put_in}");
 }

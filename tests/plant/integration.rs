@@ -34,7 +34,7 @@ fn halving_the_step_divides_the_error_by_sixteen() {
     for name in ["fried2008", "motion_base", "scattered", "tsai2000"] {
         let mut machine = machine(name);
         // The kink of dry friction has no fourth derivative.
-        machine.actuator.coulomb_friction = 0.0;
+        machine.actuator.coulomb_friction = [0.0; 6];
         let ends = [1, 2, 4, 8, 64].map(|steps| *motion(&machine, 0.016, steps, 0.8).last().unwrap());
         let errors: Vec<_> = ends[..4].iter().map(|end| distance(end, &ends[4])).collect();
         let ratios: Vec<_> = errors.iter().zip(&errors[1..]).map(|(a, b)| a / b).collect();

@@ -99,7 +99,7 @@ fn spin_has_energy_too() {
 #[test]
 fn reflected_mass_has_energy_too() {
     let mut machine = machine("motion_base");
-    (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = (0.0, 0.0);
+    (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
     assert!(machine.actuator.reflected_mass > 0.0);
     assert_balanced("motion_base with drives", &machine, 0.1, 1.0);
 }

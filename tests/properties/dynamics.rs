@@ -6,6 +6,7 @@ use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Twist};
+use hexad::model::transmission::Transmission;
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
 
@@ -69,7 +70,7 @@ proptest! {
     /// A motion run backwards through the same poses needs the same forces, friction aside.
     #[test]
     fn time_can_be_reversed((mut machine, _, motion) in machine_in_motion()) {
-        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = (0.0, 0.0);
+        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
         let Twist { angular, linear } = motion.twist;
         let back = Motion { twist: Twist { angular: -angular, linear: -linear }, ..motion };
         prop_assert!(relative(forces(&machine, &back).as_slice(), forces(&machine, &motion).as_slice()) < 1e-12);
@@ -84,20 +85,48 @@ proptest! {
         prop_assert!(relative(spinning.as_slice(), exact.as_slice()) > 1e-9, "the spin costs something");
     }
 
+    /// What a leg gets of a command, by the definition; and the command for it.
+    #[test]
+    fn commands_are_the_inverse_of_transmission(
+        (mut machine, _, motion) in machine_in_motion(),
+        commands in vector6(),
+        scale in vector6(),
+        load in vector6(),
+    ) {
+        machine.actuator.force_scale = scale.map(|scale| 1.2 + 0.7 * scale).into();
+        machine.actuator.load_friction = load.map(|load| 0.4 * (1.0 + load)).into();
+        let transmission = Transmission::of_motion(&machine, &motion);
+        let forces = transmission.leg_forces(&commands.into());
+        let (legs, actuator) = (leg_motion(&machine, &motion), &machine.actuator);
+        for i in 0..6 {
+            let own = actuator.force_scale[i] * commands[i];
+            let sign = (legs.rate[i] / actuator.coulomb_smoothing).clamp(-1.0, 1.0);
+            let expected = own - actuator.load_friction[i] * own.abs() * sign;
+            prop_assert!((forces[i] - expected).abs() <= 1e-12 * own.abs());
+        }
+        let back = Vector6::from(transmission.commands(&forces));
+        prop_assert!((back - commands).amax() < 1e-12);
+        // Whatever the rates, the available force takes no more than the largest command.
+        for force in [actuator.available_force(), -actuator.available_force()] {
+            let most = transmission.commands(&[force; 6]).into_iter().map(f64::abs).fold(0.0, f64::max);
+            prop_assert!(most <= actuator.max_force * (1.0 + 1e-12));
+        }
+    }
+
     /// Each drive adds its own force and nothing to its neighbours.
     #[test]
     fn drives_add_their_force((machine, _, motion) in machine_in_motion()) {
         let mut ideal = machine.clone();
         ideal.actuator.reflected_mass = 0.0;
-        (ideal.actuator.viscous_friction, ideal.actuator.coulomb_friction) = (0.0, 0.0);
+        (ideal.actuator.viscous_friction, ideal.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
         let legs = leg_motion(&machine, &motion);
         let (with, without) = (forces(&machine, &motion), forces(&ideal, &motion));
         let actuator = &machine.actuator;
         for i in 0..6 {
             let smooth = (legs.rate[i] / actuator.coulomb_smoothing).clamp(-1.0, 1.0);
             let drive = actuator.reflected_mass * legs.accel[i]
-                + actuator.viscous_friction * legs.rate[i]
-                + actuator.coulomb_friction * smooth;
+                + actuator.viscous_friction[i] * legs.rate[i]
+                + actuator.coulomb_friction[i] * smooth;
             prop_assert!((with[i] - without[i] - drive).abs() < 1e-12 * with.amax().max(without.amax()));
         }
     }

@@ -90,8 +90,8 @@ fn rescaled(machine: &Machine, motion: &Motion, s: f64, m: f64, t: f64) -> (Mach
     }
     let actuator = &mut result.actuator;
     actuator.reflected_mass *= m;
-    actuator.viscous_friction *= m / t;
-    actuator.coulomb_friction *= m * s / (t * t);
+    actuator.viscous_friction = actuator.viscous_friction.map(|friction| friction * m / t);
+    actuator.coulomb_friction = actuator.coulomb_friction.map(|friction| friction * m * s / (t * t));
     actuator.coulomb_smoothing *= s / t;
     let Motion { pose, twist, acceleration } = motion;
     let motion = Motion {
@@ -184,6 +184,9 @@ proptest! {
             universal_axis: order.map(|leg| legs.universal_axis[leg]),
         };
         other.joints = legs.joints(&other.home);
+        for friction in [&mut other.actuator.viscous_friction, &mut other.actuator.coulomb_friction] {
+            *friction = order.map(|leg| friction[leg]);
+        }
         let expected = order.map(|leg| forces(&machine, &motion)[leg]);
         prop_assert!(relative(&forces(&other, &motion), &expected) < 1e-12);
         let expected = order.map(|leg| leg_motion(&machine, &motion).accel[leg]);

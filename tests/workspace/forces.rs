@@ -34,8 +34,8 @@ fn by_force(machine: &Machine, pose: Pose, effort: AccelerationDemand) -> f64 {
 /// With friction by direction alone.
 fn dry(name: &str) -> Machine {
     let mut machine = machine(name);
-    machine.actuator.viscous_friction = 0.0;
-    machine.actuator.coulomb_friction = 0.01 * machine.actuator.max_force;
+    machine.actuator.viscous_friction = [0.0; 6];
+    machine.actuator.coulomb_friction = [0.01 * machine.actuator.max_force; 6];
     machine
 }
 

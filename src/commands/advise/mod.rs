@@ -88,7 +88,7 @@ fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, Ad
         singular: all.singular,
         peak_force_n: all.peak,
         peak_inside_n: inside.peak,
-        max_force_n: config.machine.actuator.max_force,
+        max_force_n: config.machine.actuator.available_force(),
         tolerance,
         fidelities: rows.collect(),
         recommended: comparison.choice(tolerance).name(),

@@ -26,7 +26,7 @@ pub struct AdviceReport {
     /// Largest force of a leg over all motions, and over the motions inside.
     pub peak_force_n: f64,
     pub peak_inside_n: f64,
-    /// `actuator.max_force_n`.
+    /// Force that every leg can get: `actuator.max_force_n`, less what scale and load friction take.
     pub max_force_n: f64,
     /// `control.fidelity_tolerance`.
     pub tolerance: f64,

@@ -53,6 +53,9 @@ pub struct CheckReport {
     /// Largest changes of payload and disturbance that are no fault; null if any is allowed.
     pub payload_change_kg: f64,
     pub disturbance_step_m_s2: f64,
+    /// Force that every leg can get whichever way it moves, and `actuator.max_force_n`.
+    pub available_force_n: f64,
+    pub max_force_n: f64,
     /// Friction of a leg that the checks permit beyond the model.
     pub friction_uncertainty_n: f64,
     /// Slowest and fastest mode of legs with separate control.
@@ -137,6 +140,8 @@ impl CheckReport {
             compensates_disturbances: control.compensate_disturbances,
             payload_change_kg: constants.disturbance_bounds.max_payload_change_kg,
             disturbance_step_m_s2: constants.disturbance_bounds.max_sudden_disturbance,
+            available_force_n: machine.actuator.available_force(),
+            max_force_n: machine.actuator.max_force,
             friction_uncertainty_n: machine.actuator.friction_uncertainty,
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
@@ -160,7 +165,7 @@ fn legs(config: &Config) -> Vec<LegAtHome> {
         to_shortest_m: length_m - actuator.min_length,
         to_longest_m: actuator.max_length - length_m,
         force_n,
-        force_ratio: force_n.map(|force: f64| force.abs() / actuator.max_force),
+        force_ratio: force_n.map(|force: f64| force.abs() / actuator.available_force()),
         joint_axis_deg,
     };
     values.map(leg).collect()

@@ -24,6 +24,14 @@ impl fmt::Display for CheckReport {
             significant(self.condition),
             significant(self.condition_limit)
         )?;
+        if self.available_force_n != self.max_force_n {
+            writeln!(
+                f,
+                "drives       of the largest command, {} N, every leg gets at least {} N (force_scale, load_friction)",
+                significant(self.max_force_n),
+                significant(self.available_force_n)
+            )?;
+        }
         self.fmt_modes(f)?;
         self.fmt_loops(f)?;
         writeln!(f, "{}", self.motion_limits)?;

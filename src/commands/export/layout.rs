@@ -4,6 +4,7 @@ use core::fmt;
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 
+use crate::model::LEGS;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::machine::{Link, Machine, TransverseInertia};
 use crate::model::rigid::Pose;
@@ -42,6 +43,13 @@ pub(super) struct LegLayout {
     pub first_axis: Vector3<f64>,
     /// L
     pub length: f64,
+}
+
+impl LegLayout {
+    /// The value of this leg.
+    pub fn of(&self, values: &[f64; LEGS]) -> f64 {
+        values.get(self.number - 1).copied().unwrap_or_default()
+    }
 }
 
 /// The six legs at home.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::layout::{LegLayout, Numbers, Shapes, home, legs, link_inertia, quaternion, realizable};
 use crate::config::Config;
-use crate::model::machine::{Actuator, Link, Machine};
+use crate::model::machine::{Link, Machine};
 use crate::model::rigid::Pose;
 
 /// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
@@ -23,8 +23,8 @@ const HEADER_COMMENT: &str = "  Written by `hexad export`. SI units and radians.
   joint universal_first_i, universal_second_i    the first axis is fixed in the base; both 0 at home
   joint prismatic_i    position: LENGTH of the leg between joint centres; velocity: its rate
   equality ball_i      closes the loop between the sites ball_rod_i and ball_platform_i
-  actuator force_i     force along the leg [N], positive pushes the platform away from the base
-  armature: reflected mass; damping: viscous friction; frictionloss: Coulomb friction.";
+  actuator force_i     command of the drive [N], positive pushes the platform away from the base; gear: force scale
+  armature: reflected mass; damping: viscous friction; frictionloss: Coulomb friction. Load friction is left out.";
 
 const VARYING_INERTIA_COMMENT: &str = "
   numeric LINK_transverse_inertia    c q l0: the link's transverse inertia is c + q (L - l0)^2 at length L; the model
@@ -73,10 +73,11 @@ pub(super) fn text(config: &Config) -> String {
         loops = each(|LegLayout { number: i, .. }, _| format!(
             "    <connect name=\"ball_{i}\" site1=\"ball_platform_{i}\" site2=\"ball_rod_{i}\"/>\n"
         )),
-        motors = each(|LegLayout { number: i, .. }, machine| {
-            let most = machine.actuator.max_force;
+        motors = each(|leg, machine| {
+            let i = leg.number;
+            let (most, scale) = (machine.actuator.max_force, leg.of(&machine.actuator.force_scale));
             format!(
-                "    <motor name=\"force_{i}\" joint=\"prismatic_{i}\" ctrlrange=\"{:?} {most:?}\"/>\n",
+                "    <motor name=\"force_{i}\" joint=\"prismatic_{i}\" gear=\"{scale:?}\" ctrlrange=\"{:?} {most:?}\"/>\n",
                 -most
             )
         }),
@@ -121,16 +122,16 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
         cylinder_radius = shapes.cylinder_radius,
         rod_radius = shapes.rod_radius,
         back = -to,
-        prismatic = prismatic_joint(leg, &machine.actuator),
+        prismatic = prismatic_joint(machine, leg),
     )
 }
 
 /// Prismatic joint of a leg, with the friction and the reflected mass of its drive.
-fn prismatic_joint(leg: &LegLayout, actuator: &Actuator) -> String {
-    let LegLayout { number: i, length, .. } = leg;
+fn prismatic_joint(machine: &Machine, leg: &LegLayout) -> String {
+    let (LegLayout { number: i, length, .. }, actuator) = (leg, &machine.actuator);
     let [shortest, longest] = [actuator.min_length, actuator.max_length];
     let [reflected, viscous, coulomb] =
-        [actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction];
+        [actuator.reflected_mass, leg.of(&actuator.viscous_friction), leg.of(&actuator.coulomb_friction)];
     format!(
         "<joint name=\"prismatic_{i}\" type=\"slide\" axis=\"0 0 1\" ref=\"{length:?}\" \
          range=\"{shortest:?} {longest:?}\" armature=\"{reflected:?}\" \

@@ -28,7 +28,8 @@ pub(super) fn text(config: &Config) -> String {
         r#"<robot name="{name}">
 <!--
 {HEADER_COMMENT}
-  Not in URDF: gravity {gravity} m/s^2, reflected mass {reflected:?} kg of every prismatic joint.
+  Not in URDF: gravity {gravity} m/s^2, reflected mass {reflected:?} kg of every prismatic joint, force scale and load
+  friction of the drives.
 -->
   <!-- Only for MuJoCo, which rejects links without mass: they get a negligible one. -->
   <mujoco><compiler boundmass="2e-15" boundinertia="2e-15"/></mujoco>
@@ -83,8 +84,8 @@ fn leg_links(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
         actuator.max_length,
         actuator.max_force,
         actuator.max_rate,
-        actuator.viscous_friction,
-        actuator.coulomb_friction,
+        leg.of(&actuator.viscous_friction),
+        leg.of(&actuator.coulomb_friction),
         cylinder_inertial = inertial(
             cylinder.mass,
             &Vector3::new(0.0, 0.0, cylinder.center_of_mass),

@@ -155,7 +155,7 @@ impl WorkspaceReport {
             acceleration_m_s2: effort.linear,
             angular_acceleration_rad_s2: effort.angular,
             condition_limit: largest_condition,
-            max_force_n: machine.actuator.max_force,
+            max_force_n: machine.actuator.available_force(),
             slices,
             regions: region_reports(regions, query.turn_deg, envelope.is_some(), largest_condition),
             largest_box: BoxRange::all(&shape, regions[2].guaranteed),

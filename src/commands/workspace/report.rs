@@ -34,7 +34,7 @@ pub struct WorkspaceReport {
     pub angular_acceleration_rad_s2: f64,
     /// `limits.condition`; 6 is best, infinite is singular.
     pub condition_limit: f64,
-    /// `actuator.max_force_n`.
+    /// Force that every leg can get: `actuator.max_force_n`, less what scale and load friction take.
     pub max_force_n: f64,
     pub slices: Vec<SliceReport>,
     /// The ball at home's orientation, the ball with any turn, and the box.
@@ -183,7 +183,7 @@ impl WorkspaceReport {
             ("limits.acceleration_m_s2", "--acceleration-m-s2")
         };
         Some(format!(
-            "payload 0: at home a leg needs {holding:.0} % of actuator.max_force_n = {} to hold the platform, {of_linear:.0} % for \
+            "payload 0: at home a leg needs {holding:.0} % of {} N (actuator.max_force_n) to hold the platform, {of_linear:.0} % for \
              {} m/s2 and {of_angular:.0} % for {} rad/s2; lower {key}, or see what less takes with {option}",
             significant(self.max_force_n),
             significant(linear),

@@ -37,9 +37,10 @@ impl DefaultLimits {
         let Some(drives) = DriveCapability::new(machine, &machine.home_pose()) else { return tolerated };
         let actuator = &machine.actuator;
         let (_, holding) = drives.hardest_held();
-        let usable = USABLE_FORCE_RATIO * actuator.max_force - actuator.viscous_friction * actuator.max_rate;
+        let available = actuator.available_force();
+        let usable = USABLE_FORCE_RATIO * available - actuator.largest_viscous_friction() * actuator.max_rate;
         // Some acceleration remains even if holding and friction use nearly all force.
-        let usable = usable.max(holding + LINEAR_SHARE * (actuator.max_force - holding));
+        let usable = usable.max(holding + LINEAR_SHARE * (available - holding));
         let for_linear = holding + LINEAR_SHARE * (usable - holding);
         let linear = lesser(TOLERATED_POSITION.acceleration, drives.linear_acceleration(for_linear, 0.0));
         let angular = lesser(TOLERATED_ORIENTATION.acceleration, drives.angular_acceleration(usable, linear));

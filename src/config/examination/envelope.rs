@@ -56,8 +56,8 @@ fn examine_forces(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     };
     let held = forces.map(hardest).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
     let Some((state, (leg, force))) = held else { return };
-    let force = force + machine.actuator.coulomb_friction;
-    if force > MAX_HOLDING_SHARE * machine.actuator.max_force {
+    let force = force + machine.actuator.largest_coulomb_friction();
+    if force > MAX_HOLDING_SHARE * machine.actuator.available_force() {
         let mut offsets: [f64; 6] = state.x.into();
         offsets.iter_mut().zip(machine.home).for_each(|(x, home)| *x -= home);
         examine_holding(examiner, leg, force, &format!("within [envelope] {}", offset_text(&offsets)));
@@ -77,7 +77,7 @@ fn examine_motion(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     }
     let actuator = &machine.actuator;
     for (key, largest, limit, unit, limited) in [
-        ("envelope.acceleration", largest_force, actuator.max_force, "N", "actuator.max_force_n"),
+        ("envelope.acceleration", largest_force, actuator.available_force(), "N", "actuator.max_force_n"),
         ("envelope.velocity", largest_rate, actuator.max_rate, "m/s", "actuator.max_rate_m_s"),
     ] {
         if largest > limit {
@@ -85,7 +85,9 @@ fn examine_motion(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
             examiner.warn(
                 key,
                 value,
-                format!("{limited} is {limit}: the drives cannot give all that is required at once"),
+                format!(
+                    "the drives give {limit} {unit} ({limited}), and cannot give all that is required at once"
+                ),
             );
         }
     }

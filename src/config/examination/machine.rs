@@ -19,7 +19,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
     let Some(drives) = DriveCapability::new(machine, &pose) else { return };
     let (leg, force) = drives.hardest_held();
     examine_holding(examiner, leg, force, "at home");
-    if force <= MAX_HOLDING_SHARE * machine.actuator.max_force {
+    if force <= MAX_HOLDING_SHARE * machine.actuator.available_force() {
         examine_limits(examiner, &drives);
     }
     for crossing in leg_crossings(machine, &pose) {
@@ -30,14 +30,15 @@ pub(super) fn examine(examiner: &mut Examiner) {
 
 /// Rejects drives that cannot hold the platform with a margin. The leg counts from 0.
 pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, place: &str) {
-    let limit = examiner.config.machine.actuator.max_force;
-    if force > MAX_HOLDING_SHARE * limit {
+    let actuator = &examiner.config.machine.actuator;
+    let (limit, available) = (actuator.max_force, actuator.available_force());
+    if force > MAX_HOLDING_SHARE * available {
         let bound = format!(
             "must be at least {} to hold the platform: leg {} needs {} N {place}, {:.0} % of the limit, and at most {:.0} % may be needed",
-            rounded((force / MAX_HOLDING_SHARE).ceil()),
+            rounded((force / MAX_HOLDING_SHARE * limit / available).ceil()),
             leg + 1,
             rounded(force),
-            100.0 * force / limit,
+            100.0 * force / available,
             100.0 * MAX_HOLDING_SHARE,
         );
         examiner.error("actuator.max_force_n", format!("{limit}"), bound);
@@ -48,7 +49,7 @@ pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, p
 /// velocities beyond the rate of the legs, which the reference keeps in any case.
 fn examine_limits(examiner: &mut Examiner, drives: &DriveCapability) {
     let config = examiner.config;
-    let (limits, force) = (&config.deployment.limits.reference, config.machine.actuator.max_force);
+    let (limits, force) = (&config.deployment.limits.reference, config.machine.actuator.available_force());
     let (linear, angular) = (limits.position.acceleration, limits.orientation.acceleration);
     let alone = [
         ("limits.acceleration_m_s2", linear, drives.linear_acceleration(force, 0.0)),

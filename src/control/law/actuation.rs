@@ -1,4 +1,4 @@
-//! Actuation: forces of one cycle under control, from the reference and the estimated error.
+//! Actuation: commands of one cycle under control, from the reference and the estimated error.
 
 use crate::control::cycle::Cycle;
 use crate::control::law::error_tracker::ErrorTracker;
@@ -7,8 +7,9 @@ use crate::control::law::force_limits::{ForceLimiter, LimitedForces};
 use crate::control::law::forces::forces;
 use crate::control::signals::diagnostic::Diagnostic;
 use crate::model::rigid::Motion;
+use crate::model::transmission::Transmission;
 
-/// Evaluates the control law. The forces act from `begin_ns` on; `desired` is the reference in the middle of
+/// Evaluates the control law. The commands act from `begin_ns` on; `desired` is the reference in the middle of
 /// their hold. The acceleration that remains after all limits is recorded for the estimator.
 #[inline(always)]
 pub(in crate::control) fn actuate(
@@ -31,14 +32,16 @@ pub(in crate::control) fn actuate(
     let error = errors.corrected_to_last_measurement(&in_middle);
     let motion = parameters.law.dynamics_motion(desired, &error, &acceleration);
     let force = forces(constants, &motion, &acceleration)?;
-    limiter.limit(cycle, &force, &motion, limited)?;
-    if limited.force != force {
+    let transmission = Transmission::of_motion(constants.machine(), &motion);
+    let command = transmission.commands(&force);
+    limiter.limit(cycle, &command, (&motion, &transmission), limited)?;
+    if limited.command != command {
         let (machine, missing) = (constants.machine(), &limited.wrench_error);
         let missing =
             constants.acceleration_by_command.acceleration_by_wrench(machine, &motion.pose, missing);
         sent.0 += missing.0;
         errors.record_removed_acceleration(constants, &missing);
     }
-    errors.record_sent(begin_ns, &sent, &limited.force);
+    errors.record_sent(begin_ns, &sent, &transmission.leg_forces(&limited.command));
     Ok(())
 }

@@ -45,7 +45,7 @@ pub(in crate::control) struct ErrorTracker {
     drives: DriveResponse,
     disturbance: DisturbanceMonitor,
     friction: UnstatedFriction,
-    /// Force that was sent last \[N\], and its feedback acceleration.
+    /// Forces that the legs get by what was sent last \[N\], and its feedback acceleration.
     sent: [f64; LEGS],
     sent_acceleration: FeedbackAcceleration,
     /// Measured error; without a new measurement, the predicted error.
@@ -175,8 +175,8 @@ impl ErrorTracker {
         self.disturbance.record_removed_acceleration(&constants.disturbance_bounds, acceleration);
     }
 
-    /// Records force and feedback acceleration that are sent, after all limits, and the instant from which
-    /// they act.
+    /// Records the forces at the legs and the feedback acceleration that are sent, after all limits, and the instant
+    /// from which they act.
     pub fn record_sent(&mut self, begin_ns: u64, acceleration: &FeedbackAcceleration, force: &[f64; LEGS]) {
         (self.sent, self.sent_acceleration) = (*force, *acceleration);
         self.estimator.record_sent(begin_ns, acceleration);

@@ -1,4 +1,4 @@
-//! Force limits: magnitude and rate of change of the actuator forces.
+//! Force limits: magnitude and rate of change of the commands to the drives.
 
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
@@ -10,79 +10,86 @@ use crate::control::signals::limits::{Limit, LimitSet};
 use crate::model::LEGS;
 use crate::model::fidelity::Gravity;
 use crate::model::inverse_jacobian::leg_wrenches;
-use crate::model::rigid::{Motion, Pose, Wrench};
+use crate::model::rigid::{Motion, Wrench};
+use crate::model::transmission::Transmission;
 
-/// Forces of one cycle, after the limits.
+/// Commands of one cycle, after the limits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control) struct LimitedForces {
-    /// Actuator forces \[N\].
-    pub force: [f64; LEGS],
-    /// Wrench of the limited forces minus wrench of the commanded forces, about C; zero if no limit acts.
+    /// Commands to the drives \[N\].
+    pub command: [f64; LEGS],
+    /// Wrench of the limited commands minus that of the wanted ones, about C; zero if no limit acts.
     pub wrench_error: Wrench,
     pub active_limits: LimitSet,
 }
 
-/// Last stage of the cycle: limits magnitude and rate of the forces.
+/// Last stage of the cycle: limits magnitude and rate of the commands.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct ForceLimiter {
-    /// Forces of the last cycle under control \[N\].
+    /// Commands of the last cycle under control \[N\].
     last: [f64; LEGS],
     /// Whether a limit changed them.
     is_limited: bool,
 }
 
 impl ForceLimiter {
-    /// Limits the forces of a motion. Fails if the weight cannot be computed.
+    /// Limits the commands of a motion. Fails if the weight cannot be computed.
     /// The rate is limited from the second cycle under control on.
     pub fn limit(
         &mut self,
         cycle: &Cycle<'_>,
-        commanded: &[f64; LEGS],
-        motion: &Motion,
+        wanted: &[f64; LEGS],
+        (motion, transmission): (&Motion, &Transmission),
         limited: &mut LimitedForces,
     ) -> Result<(), Diagnostic> {
         let Cycle { constants, state, .. } = *cycle;
-        let possible = limit_magnitude(constants, commanded, motion)?;
-        let force = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
-        limited.force = force;
+        let possible = limit_magnitude(constants, wanted, (motion, transmission))?;
+        let command = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
+        limited.command = command;
         limited.active_limits = LimitSet::default()
-            .with(Limit::Force, possible != *commanded)
-            .with(Limit::ForceRate, force != possible);
-        (self.last, self.is_limited) = (force, force != *commanded);
+            .with(Limit::Force, possible != *wanted)
+            .with(Limit::ForceRate, command != possible);
+        (self.last, self.is_limited) = (command, command != *wanted);
         if self.is_limited {
-            limited.wrench_error = wrench_error(constants, &motion.pose, &force, commanded);
+            limited.wrench_error = wrench_error(constants, (motion, transmission), &command, wanted);
         }
         Ok(())
     }
 
-    /// Limits the change of force since the last cycle. All legs are scaled by one factor.
-    fn limit_rate(&self, constants: &Constants, force: &[f64; LEGS]) -> [f64; LEGS] {
+    /// Limits the change since the last cycle. All legs are scaled by one factor.
+    fn limit_rate(&self, constants: &Constants, command: &[f64; LEGS]) -> [f64; LEGS] {
         let parameters = &constants.parameters;
         let change = parameters.force_rate * parameters.period_ns as f64 * 1e-9;
-        scale_into_bounds(&self.last, force, |last| (last - change, last + change))
+        scale_into_bounds(&self.last, command, |last| (last - change, last + change))
     }
 }
 
 // Rarely called, hence out of line: the cycle stays short.
 #[inline(never)]
-fn wrench_error(constants: &Constants, pose: &Pose, force: &[f64; LEGS], commanded: &[f64; LEGS]) -> Wrench {
-    let difference = Vector6::from(*force) - Vector6::from(*commanded);
-    Wrench::from_vector(&(leg_wrenches(constants.machine(), pose) * difference))
+fn wrench_error(
+    constants: &Constants,
+    (motion, transmission): (&Motion, &Transmission),
+    command: &[f64; LEGS],
+    wanted: &[f64; LEGS],
+) -> Wrench {
+    let [force, wanted] = [command, wanted].map(|command| Vector6::from(transmission.leg_forces(command)));
+    Wrench::from_vector(&(leg_wrenches(constants.machine(), &motion.pose) * (force - wanted)))
 }
 
-/// Limits the magnitude. The share of the forces that carries the weight is kept; one factor reduces the
+/// Limits the magnitude. The share of the commands that carries the weight is kept; one factor reduces the
 /// rest, so that the rest keeps its direction.
 fn limit_magnitude(
     constants: &Constants,
-    force: &[f64; LEGS],
-    motion: &Motion,
+    command: &[f64; LEGS],
+    (motion, transmission): (&Motion, &Transmission),
 ) -> Result<[f64; LEGS], Diagnostic> {
     let limit = constants.machine().actuator.max_force;
-    if force.iter().all(|value| value.abs() <= limit) {
-        return Ok(*force);
+    if command.iter().all(|value| value.abs() <= limit) {
+        return Ok(*command);
     }
     let weight = constants.dynamics.forces::<Gravity>(motion).ok_or(DiagnosticCode::SingularPose)?;
-    Ok(scale_into_bounds(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
+    let weight = transmission.commands(&weight).map(|value| value.max(-limit).min(limit));
+    Ok(scale_into_bounds(&weight, command, |_| (-limit, limit)))
 }
 
 /// Moves from `start`, which is within its bounds, toward `end` as far as all bounds allow.

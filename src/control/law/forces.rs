@@ -1,4 +1,4 @@
-//! Drive forces of a commanded motion, by the terms of the dynamics that the control mode includes.
+//! Forces at the legs of a commanded motion, by the terms of the dynamics that the control mode includes.
 
 use crate::control::constants::Constants;
 use crate::control::law::ControlMode;

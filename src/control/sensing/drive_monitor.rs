@@ -28,7 +28,7 @@ const MAX_MISSING_S: f64 = 0.05;
 /// Checks of the drives' status over time.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct DriveMonitor {
-    /// Forces sent in the previous cycle \[N\].
+    /// Commands sent in the previous cycle \[N\].
     sent: [f64; LEGS],
     commanded: [f64; LEGS],
     actual: [f64; LEGS],
@@ -71,7 +71,7 @@ impl DriveMonitor {
         }
     }
 
-    /// Records the forces that are sent in this cycle.
+    /// Records the commands that are sent in this cycle.
     pub fn record_sent(&mut self, force: &[f64; LEGS]) {
         self.sent = *force;
     }

@@ -193,8 +193,8 @@ pub fn scaled(machine: &Machine, ratio: f64) -> Machine {
     }
     let actuator = &mut scaled.actuator;
     actuator.reflected_mass *= ratio;
-    actuator.viscous_friction *= ratio;
-    actuator.coulomb_friction *= ratio;
+    actuator.viscous_friction.iter_mut().for_each(|friction| *friction *= ratio);
+    actuator.coulomb_friction.iter_mut().for_each(|friction| *friction *= ratio);
     scaled
 }
 

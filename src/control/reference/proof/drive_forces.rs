@@ -29,7 +29,7 @@ use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
 use crate::model::triples::LegLanes;
 
-/// Largest force of a stop, as a share of `actuator.max_force_n`. The rest is for feedback.
+/// Largest force of a stop, as a share of the force that every leg can get. The rest is for feedback.
 const MAX_MOVING_SHARE: f64 = 0.95;
 /// Most loads that are computed in a proof: it bounds the longest cycle.
 const MAX_EVALUATIONS: u32 = 4;
@@ -46,7 +46,7 @@ pub(in crate::control::reference) struct ForceBounds {
 impl ForceBounds {
     /// Bounds for a platform within them.
     pub fn new(machine: &Machine) -> Self {
-        let force = machine.actuator.max_force;
+        let force = machine.actuator.available_force();
         Self { holding: MAX_HOLDING_SHARE * force, moving: MAX_MOVING_SHARE * force }
     }
 
@@ -55,14 +55,12 @@ impl ForceBounds {
     pub fn relax_to(&mut self, constants: &Constants, loads: &DriveLoads) -> bool {
         let LegLanes(forces) = loads.holding;
         let actuator = &constants.machine().actuator;
-        let holding = largest(forces) + actuator.coulomb_friction;
+        let (available, friction) = (actuator.available_force(), actuator.largest_coulomb_friction());
+        let holding = largest(forces) + friction;
         let is_beyond = holding > self.holding;
         if is_beyond {
-            let moving = holding + (MAX_MOVING_SHARE - MAX_HOLDING_SHARE) * actuator.max_force;
-            *self = Self {
-                holding: holding + START_FORCE_RATIO * actuator.max_force,
-                moving: moving.min(actuator.max_force),
-            };
+            let moving = holding + (MAX_MOVING_SHARE - MAX_HOLDING_SHARE) * available;
+            *self = Self { holding: holding + START_FORCE_RATIO * available, moving: moving.min(available) };
         }
         is_beyond
     }

@@ -16,7 +16,7 @@ fn no_force_changes_by_more_than_its_bound() {
         let mut machine = machine(&mut samples);
         machine.platform.center_of_mass = samples.vector(0.3);
         machine.actuator.reflected_mass = 100.0 * samples.uniform();
-        machine.actuator.viscous_friction = 100.0 * samples.uniform();
+        machine.actuator.viscous_friction = [100.0 * samples.uniform(); LEGS];
         let (dynamics, changes) = (InverseDynamics::new(&machine), ForceChangeBounds::new(&machine));
         let (stroke, mut nearest) = (machine.actuator.stroke(), 0.0_f64);
         for _ in 0..1000 {
@@ -49,7 +49,7 @@ fn no_force_changes_by_more_than_its_bound() {
                 (changes.at_rest(turn, turned_leg), changes.moving(&largest, turn, turned_leg));
             let wrench = rest.wrench + moving.wrench + change * (norm + changes.axial_norm(&largest));
             // The reference never exceeds the rate of the legs.
-            let friction = machine.actuator.viscous_friction
+            let friction = machine.actuator.largest_viscous_friction()
                 * (largest.velocity + changes.arm * largest.angular_velocity - changes.max_rate).max(0.0);
             let bound = largest_row / (1.0 - inverse * change) * wrench + rest.axial + moving.axial;
             for (there, here) in forces(center.displaced(&step), twist).iter().zip(at_center) {
