@@ -3,6 +3,7 @@
 mod common;
 
 mod fidelity;
+mod identification;
 mod ladder;
 mod near_singular;
 mod paper;

@@ -7,6 +7,7 @@
 //! | workspace | [`drive_capability`], [`pose_quality`], [`region_shape`], [`clearance`], [`region_search`], [`region_proof`] |
 //! | collisions between legs | [`leg_crossing`] |
 //! | other poses with the same leg lengths | [`assembly_modes`] |
+//! | parameters of a machine from recorded motions | [`identification`], [`drive_delay`] |
 //! | how fast the platform leaves a pose under constant forces | [`held_forces`] |
 //! | margins of a sampled loop | [`sampled_loop`] |
 //! | path of the reference to a target | [`target_motion`] |
@@ -24,6 +25,7 @@ pub mod envelope;
 pub mod fidelity_choice;
 pub mod fidelity_error;
 pub mod held_forces;
+pub mod identification;
 mod known_delay;
 pub mod leg_crossing;
 pub mod pose_quality;

@@ -1,0 +1,137 @@
+//! Identification: masses, inertias, friction and force scales of a machine, from recorded motions.
+//!
+//! | step | file |
+//! | --- | --- |
+//! | motion and commands of a recording at the same instants, smoothed alike | [`samples`] |
+//! | equations, linear in parameters and force scales, and their QR decomposition | `equations` |
+//! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
+//! | most probable parameters, their deviations | `fit` |
+//!
+//! Equations alone do not tell everything apart, see [`crate::model::regressor`]: what they leave open stays as the file
+//! has it. Without a known weight on the platform in one of the recordings no motion distinguishes the mean of the force
+//! scales from all masses and friction: then the mean stays as it is.
+
+use nalgebra::DVector;
+
+use self::equations::{Equation, equations};
+use self::fit::{Fit, fit};
+use self::parameters::{Bodies, FREE, Free, Parameters};
+use crate::model::LEGS;
+use crate::model::machine::{Machine, Platform};
+
+mod equations;
+mod fit;
+mod parameters;
+pub mod samples;
+
+pub use self::equations::Load;
+pub use self::samples::{MotionSample, samples};
+
+/// Samples of one recording, and what was on the platform.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Samples.
+    pub samples: Vec<MotionSample>,
+    /// Body on the platform.
+    pub load: Load,
+}
+
+/// Identified machine.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// The machine, without the known weights and without the payload.
+    pub machine: Machine,
+    /// The payload; meaningless if no run had one.
+    pub payload: Platform,
+    /// Equations that were used.
+    pub equations: usize,
+    /// Number of combinations of parameters that the equations show better than they were known before, and of the others.
+    pub shown: usize,
+    /// See above.
+    pub unknown: usize,
+    /// RMS of what is left of the force of each leg \[N\].
+    pub residual: [f64; LEGS],
+    /// Correlation of successive residuals of each leg: 0 for white noise.
+    pub correlation: [f64; LEGS],
+    parameters: Parameters,
+    fit: Fit,
+}
+
+/// A value and its standard deviation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimated {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Value of the file, and the deviation that was expected of it.
+    pub before: f64,
+    /// See above.
+    pub expected: f64,
+}
+
+/// Identifies a machine from runs; `None` if they do not have enough equations. With `holds_machine` only the payload is
+/// identified.
+pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Identification> {
+    let mut parameters = Parameters::new(file);
+    if holds_machine {
+        parameters.hold_machine();
+    }
+    let all: Vec<Equation> = runs.iter().flat_map(|run| equations(file, &run.samples, &run.load)).collect();
+    let is_scale_known = holds_machine || runs.iter().any(|run| matches!(run.load, Load::Known { .. }));
+    let fit = fit(&parameters, &all, file.actuator.max_force, is_scale_known)?;
+    let Bodies { machine, payload } = parameters.bodies(&fit.free);
+    let Fit { shown, unknown, residual, correlation, .. } = fit;
+    Some(Identification {
+        machine,
+        payload,
+        equations: all.len(),
+        shown,
+        unknown,
+        residual,
+        correlation,
+        parameters,
+        fit,
+    })
+}
+
+impl Identification {
+    /// A quantity of machine and payload with its deviation.
+    pub fn estimate(&self, quantity: impl Fn(&Machine, &Platform) -> f64) -> Estimated {
+        let Self { parameters, fit: Fit { free, covariance, .. }, .. } = self;
+        let at = |free: &Free| {
+            let Bodies { machine, payload } = parameters.bodies(free);
+            quantity(&machine, &payload)
+        };
+        let gradient = DVector::from_fn(FREE, |index, _| {
+            let step = Free::from_fn(|row, _| {
+                if row == index { DIFFERENCE * parameters.deviation.row(index).x } else { 0.0 }
+            });
+            (at(&(free + step)) - at(&(free - step))) / (2.0 * DIFFERENCE * parameters.deviation.row(index).x)
+        });
+        let scaled = gradient.component_mul(&DVector::from_iterator(FREE, parameters.deviation.iter().copied()));
+        Estimated {
+            value: at(free),
+            deviation: gradient.dot(&(covariance * &gradient)).max(0.0).sqrt(),
+            before: at(&parameters.prior),
+            expected: scaled.norm(),
+        }
+    }
+}
+
+/// Step of differences, over the deviation of a parameter.
+const DIFFERENCE: f64 = 1e-4;
+
+/// RMS and largest difference between commanded and modelled force of each leg \[N\], at the drives: what a machine does not
+/// explain of a run.
+pub fn prediction_errors(machine: &Machine, run: &Run) -> [[f64; 2]; LEGS] {
+    let unknowns = Parameters::new(machine).unknowns(&Parameters::new(machine).prior);
+    let mut errors = [(0.0, 0.0_f64, 0_u32); LEGS];
+    for equation in equations(machine, &run.samples, &run.load) {
+        let residual = fit::residual(&equation, &unknowns);
+        if let Some((squares, largest, count)) = errors.get_mut(equation.leg) {
+            (*squares, *largest, *count) = (*squares + residual * residual, largest.max(residual.abs()), *count + 1);
+        }
+    }
+    errors.map(|(squares, largest, count)| [(squares / f64::from(count.max(1))).sqrt(), largest])
+}
