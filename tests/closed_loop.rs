@@ -18,6 +18,7 @@ mod false_alarms;
 mod feedback;
 mod fidelities;
 mod hardware_failures;
+mod identification;
 mod inputs;
 mod limits;
 mod modes;

@@ -18,6 +18,7 @@ use self::faults::FaultTables;
 use self::forward_kinematics::ForwardKinematicsArguments;
 use self::goto::GotoArguments;
 use self::hold::HoldArguments;
+use self::identify::IdentifyArguments;
 use self::inverse_dynamics::InverseDynamicsArguments;
 use self::jog::JogArguments;
 use self::log::{FORMAT_VARIABLE, LogFormat};
@@ -49,6 +50,7 @@ pub mod faults;
 pub mod forward_kinematics;
 mod goto;
 mod hold;
+mod identify;
 pub mod in_step;
 pub mod inverse_dynamics;
 mod jog;
@@ -122,6 +124,8 @@ enum CommandArguments {
     Check(CheckArguments),
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
     Doctor(DoctorArguments),
+    /// Identify masses, friction and force scales of the machine from recordings of its motions
+    Identify(IdentifyArguments),
     /// Show the error and the time of each model fidelity over an envelope or a trajectory, and recommend one
     Advise(AdviseArguments),
     /// Map what the machine reaches and what it can do there; find the largest regions without obstacle
@@ -169,6 +173,7 @@ impl CommandLine {
             Is::Messages(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
             Is::Doctor(arguments) => arguments.execute(),
+            Is::Identify(arguments) => arguments.execute(),
             Is::Advise(arguments) => arguments.execute(),
             Is::Workspace(arguments) => arguments.execute(),
             Is::Export(arguments) => arguments.execute(),

@@ -15,6 +15,7 @@ pub mod edited;
 pub mod extremes;
 pub mod fast;
 pub mod hardware_loop;
+pub mod identified;
 pub mod libhexad;
 pub mod limit_check;
 pub mod not_run;

@@ -110,9 +110,10 @@ impl Problem<'_> {
         let Self { parameters, triangles, is_scale_known } = self;
         let unknowns = parameters.unknowns(free).push(-1.0);
         let scales = unknowns.fixed_rows::<LEGS>(SCALE);
-        let data = triangles.iter().zip(&scales).flat_map(|(r, scale)| {
-            (r * unknowns / (scale * sigma)).iter().copied().collect::<Vec<_>>()
-        });
+        let data = triangles
+            .iter()
+            .zip(&scales)
+            .flat_map(|(r, scale)| (r * unknowns / (scale * sigma)).iter().copied().collect::<Vec<_>>());
         let departure = free - parameters.prior;
         let prior = departure.component_div(&parameters.deviation);
         let scales = departure.fixed_rows::<LEGS>(LOG_SCALE).sum() / LEGS as f64;
@@ -145,7 +146,8 @@ impl Problem<'_> {
                 let mut damped = normal.clone();
                 damped.set_diagonal(&(normal.diagonal() * (1.0 + damping)));
                 let step = damped.cholesky()?.solve(&gradient);
-                let step = Free::from_iterator(step.iter().copied()).component_mul(&self.parameters.deviation);
+                let step =
+                    Free::from_iterator(step.iter().copied()).component_mul(&self.parameters.deviation);
                 let next = self.parameters.within_bounds(free - step);
                 let next_terms = self.terms(&next, sigma);
                 change = before - next_terms.norm_squared();
@@ -169,10 +171,8 @@ impl Problem<'_> {
         let information = of_data.tr_mul(&of_data).symmetric_eigenvalues();
         let shown = information.iter().filter(|value| **value > 1.0).count();
         let scaled = jacobian.tr_mul(&jacobian).cholesky()?.inverse();
-        let by = DMatrix::from_diagonal(&DVector::from_iterator(
-            FREE,
-            self.parameters.deviation.iter().copied(),
-        ));
+        let by =
+            DMatrix::from_diagonal(&DVector::from_iterator(FREE, self.parameters.deviation.iter().copied()));
         Some((&by * scaled * &by, shown, FREE - shown))
     }
 }

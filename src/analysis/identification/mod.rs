@@ -109,7 +109,8 @@ impl Identification {
             });
             (at(&(free + step)) - at(&(free - step))) / (2.0 * DIFFERENCE * parameters.deviation.row(index).x)
         });
-        let scaled = gradient.component_mul(&DVector::from_iterator(FREE, parameters.deviation.iter().copied()));
+        let scaled =
+            gradient.component_mul(&DVector::from_iterator(FREE, parameters.deviation.iter().copied()));
         Estimated {
             value: at(free),
             deviation: gradient.dot(&(covariance * &gradient)).max(0.0).sqrt(),
@@ -122,15 +123,22 @@ impl Identification {
 /// Step of differences, over the deviation of a parameter.
 const DIFFERENCE: f64 = 1e-4;
 
-/// RMS and largest difference between commanded and modelled force of each leg \[N\], at the drives: what a machine does not
-/// explain of a run.
-pub fn prediction_errors(machine: &Machine, run: &Run) -> [[f64; 2]; LEGS] {
+impl Run {
+    /// Time from the first to the last sample \[s\].
+    pub fn duration_s(&self) -> f64 {
+        self.samples.first().zip(self.samples.last()).map_or(0.0, |(first, last)| last.time_s - first.time_s)
+    }
+}
+
+/// RMS and largest part of the commands of each leg \[N\] in runs that a machine does not explain.
+pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
     let unknowns = Parameters::new(machine).unknowns(&Parameters::new(machine).prior);
     let mut errors = [(0.0, 0.0_f64, 0_u32); LEGS];
-    for equation in equations(machine, &run.samples, &run.load) {
+    for equation in runs.iter().flat_map(|run| equations(machine, &run.samples, &run.load)) {
         let residual = fit::residual(&equation, &unknowns);
         if let Some((squares, largest, count)) = errors.get_mut(equation.leg) {
-            (*squares, *largest, *count) = (*squares + residual * residual, largest.max(residual.abs()), *count + 1);
+            (*squares, *largest, *count) =
+                (*squares + residual * residual, largest.max(residual.abs()), *count + 1);
         }
     }
     errors.map(|(squares, largest, count)| [(squares / f64::from(count.max(1))).sqrt(), largest])

@@ -188,8 +188,10 @@ fn scaled(link: &Link, mass: f64, logs: &Vector3<f64>, ends: [f64; 2]) -> Link {
     scaled.axial_inertia *= along.exp();
     // Across, a link has at least half of its axial inertia at every length.
     let inertia = &link.transverse_inertia;
-    let least = ends.map(|length| inertia.constant + inertia.quadratic * (length - inertia.reference_length).powi(2));
-    let excess = least.into_iter().chain([inertia.constant]).fold(f64::INFINITY, f64::min) - 0.5 * link.axial_inertia;
+    let least =
+        ends.map(|length| inertia.constant + inertia.quadratic * (length - inertia.reference_length).powi(2));
+    let excess =
+        least.into_iter().chain([inertia.constant]).fold(f64::INFINITY, f64::min) - 0.5 * link.axial_inertia;
     scaled.transverse_inertia.constant +=
         excess * (across.exp() - 1.0) + 0.5 * (scaled.axial_inertia - link.axial_inertia);
     scaled
@@ -214,7 +216,8 @@ pub(super) fn log_cholesky(body: &Platform) -> SVector<f64, BODY> {
     let moments = moments + Matrix3::identity() * (LEAST_MOMENT * moments.trace());
     // An upper triangle: the lower one of the reversed axes.
     let reversed = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
-    let lower = (reversed * moments * reversed).cholesky().map_or(Matrix3::identity(), |cholesky| cholesky.l());
+    let lower =
+        (reversed * moments * reversed).cholesky().map_or(Matrix3::identity(), |cholesky| cholesky.l());
     let u = reversed * lower * reversed;
     let [x, y, z]: [f64; 3] = body.center_of_mass.into();
     let a = 0.5 * body.mass.ln();

@@ -1,8 +1,6 @@
 //! `hexad doctor`: facts about this host for a hard real-time loop, its wake-up latency, and the rates that
 //! it allows.
 //!
-//! `hexad doctor --drive` measures the delay of the drives in recordings of a motion.
-//!
 //! The doctor requests the daemon's rights, and measures a thread that is set up and waits like the daemon's.
 
 use std::path::{Path, PathBuf};
@@ -32,7 +30,6 @@ use crate::realtime::setup::refusals::SetupStep;
 use crate::realtime::setup::{Shortfall, idle, memory};
 use crate::realtime::stop_request::Stop;
 
-mod drive;
 pub mod facts;
 mod files;
 pub mod latency;
@@ -59,9 +56,6 @@ pub struct DoctorArguments {
     /// Print the report as JSON instead of the text
     #[arg(long)]
     json: bool,
-    /// Measure the delay of the drives in recordings of a motion, instead of the host: [drive] delay_us
-    #[arg(long, value_name = "RECORDING", num_args = 1.., conflicts_with_all = ["cpu", "disturb"])]
-    drive: Vec<PathBuf>,
     /// Measure although a controller runs on the same CPUs, and delay it
     #[arg(long)]
     disturb: bool,
@@ -69,9 +63,6 @@ pub struct DoctorArguments {
 
 impl DoctorArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        if !self.drive.is_empty() {
-            return drive::run(&self.drive, self.json, self.report.as_ref());
-        }
         Ok(run(&self, &Stop::on_signals()?)?)
     }
 }

@@ -1,4 +1,4 @@
-//! `hexad doctor --drive`: the dead time of the plant, from a recording of real processes.
+//! `hexad identify`: the dead time of the plant, from a recording of real processes.
 
 use serde_json::Value;
 
@@ -31,10 +31,10 @@ fn the_dead_time_of_the_drives_is_measured() {
 
     let files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     let recording = files[0].display().to_string();
-    let Ended { status, stdout, stderr } = run(&machine, &["doctor", "--drive", &recording]);
+    let Ended { status, stdout, stderr } = run(&machine, &["identify", &recording]);
     assert!(status.success(), "{stderr}");
     assert!(stdout.contains("\n[drive]\ndelay_us = "), "{stdout}");
-    let Ended { stdout, .. } = run(&machine, &["doctor", "--json", "--drive", &recording]);
+    let Ended { stdout, .. } = run(&machine, &["identify", "--json", &recording]);
     let found: Value = serde_json::from_str(&stdout).unwrap();
     let delay_us = found["delay_us"].as_f64().unwrap();
     println!("{delay_us} us");

@@ -1,0 +1,125 @@
+//! `hexad identify`: parameters of a machine from recordings of its motions, and a new machine file with them.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use self::recordings::Recorded;
+use self::report::{Delay, IdentificationReport};
+use super::failure::{CommandError, Failure};
+use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
+use crate::analysis::identification::{Load, Run, identify, samples};
+use crate::config::Config;
+use crate::output::files::{print, print_json};
+
+mod quantities;
+mod recordings;
+mod report;
+
+/// Largest double standard deviation of a delay that is shown, as a ratio of the delay and \[s\]. Half a millisecond more
+/// or less hardly affects the loop.
+const MAX_DELAY_RATIO: f64 = 0.1;
+const MAX_DELAY_DEVIATION_S: f64 = 5e-4;
+
+#[derive(Debug, Args)]
+pub struct IdentifyArguments {
+    /// Recordings of motions under control, all with the same platform
+    #[arg(value_name = "RECORDING", required_unless_present = "payload")]
+    recordings: Vec<PathBuf>,
+    /// Recordings with a known weight on the platform: they show the force scales
+    #[arg(long, value_name = "RECORDING", num_args = 1.., requires_all = ["known_mass", "at", "recordings"])]
+    loaded: Vec<PathBuf>,
+    /// The known weight, a compact one [kg]
+    #[arg(long, value_name = "KG", requires = "loaded")]
+    known_mass: Option<f64>,
+    /// Its centre of mass, in platform axes [m]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_hyphen_values = true,
+        requires = "loaded"
+    )]
+    at: Vec<f64>,
+    /// Recordings with a payload that is to be identified; without other recordings the machine is as its file says
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    payload: Vec<PathBuf>,
+    /// Recordings of another motion, whose forces are predicted before and after
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    validate: Vec<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reason why nothing is identified.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    #[error(
+        "too little motion under control is recorded; record `hexad excite`, or 20 s or more of another motion of all legs"
+    )]
+    TooLittle,
+    #[error("recordings of two machines: {0} and {1}; identify each alone")]
+    TwoMachines(String, String),
+    #[error("--known-mass must be greater than 0, and --at within 100 m")]
+    Weight,
+}
+
+impl CommandError for IdentifyError {
+    fn has_begun(&self) -> bool {
+        true
+    }
+}
+
+impl IdentifyArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let report = self.report()?;
+        if self.json {
+            print_json(&report)?
+        } else {
+            print(&report)?
+        }
+        Ok(())
+    }
+
+    fn report(&self) -> Result<IdentificationReport, Failure> {
+        let mut recorded = Recorded::default();
+        let [empty, loaded, payload, other] =
+            [&self.recordings, &self.loaded, &self.payload, &self.validate].map(|paths| recorded.read(paths));
+        let (empty, loaded, payload, other) = (empty?, loaded?, payload?, other?);
+        let (config, _) = recorded.configuration.ok_or(IdentifyError::TooLittle)?;
+        let machine = &config.machine;
+        let delay = delay(&config, [&empty, &loaded, &payload].into_iter().flatten().cloned().collect());
+        let runs_of = |stretches: &[RecordedStretch], load: Load| -> Vec<Run> {
+            stretches.iter().map(|stretch| Run { samples: samples(stretch, delay.used_s), load }).collect()
+        };
+        let known = self.known_weight()?;
+        let runs = [runs_of(&empty, Load::Empty), runs_of(&loaded, known), runs_of(&payload, Load::Payload)]
+            .concat();
+        let found = identify(machine, &runs, self.recordings.is_empty()).ok_or(IdentifyError::TooLittle)?;
+        let validation = runs_of(&other, Load::Empty);
+        Ok(IdentificationReport::new(&config, &found, &runs, &validation, delay))
+    }
+
+    fn known_weight(&self) -> Result<Load, IdentifyError> {
+        match (self.known_mass, self.at.as_slice()) {
+            (Some(mass), [x, y, z]) => {
+                let at = [*x, *y, *z];
+                let is_valid = mass > 0.0 && mass.is_finite() && at.iter().all(|x| x.abs() < 100.0);
+                if is_valid { Ok(Load::Known { mass, at }) } else { Err(IdentifyError::Weight) }
+            }
+            _ => Ok(Load::Empty),
+        }
+    }
+}
+
+/// Delay of the drives: from the motion if that shows it, else of the file.
+fn delay(config: &Config, stretches: Vec<RecordedStretch>) -> Delay {
+    let shown = drive_delay(&config.machine, &stretches).filter(|found| {
+        let Estimate { delay_s, deviation_s } = found.mean;
+        2.0 * deviation_s <= MAX_DELAY_DEVIATION_S.max(MAX_DELAY_RATIO * delay_s)
+    });
+    let used_s = shown.map_or(config.deployment.drive.total_delay_s(), |found| found.mean.delay_s);
+    Delay { used_s, shown, lag_s: config.deployment.drive.lag_s, file_s: config.deployment.drive.delay_s }
+}

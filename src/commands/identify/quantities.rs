@@ -1,0 +1,62 @@
+//! Quantities that the identification shows: keys of the machine file, and combinations that are known better than their
+//! parts.
+
+use crate::model::LEGS;
+use crate::model::machine::{Machine, Platform};
+
+/// A number of machine and payload.
+pub(super) struct Quantity {
+    /// Key of the machine file, or what a combination is.
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub value: fn(&Machine, &Platform) -> f64,
+}
+
+const fn quantity(name: &'static str, unit: &'static str, value: fn(&Machine, &Platform) -> f64) -> Quantity {
+    Quantity { name, unit, value }
+}
+
+/// Of the platform, the links and all drives.
+pub(super) const BODIES: [Quantity; 18] = [
+    quantity("platform.mass_kg", "kg", |machine, _| machine.platform.mass),
+    quantity("platform with six rods", "kg", |machine, _| {
+        machine.platform.mass + LEGS as f64 * machine.rod.mass
+    }),
+    quantity("platform.center_of_mass_m[1]", "m", |machine, _| machine.platform.center_of_mass.x),
+    quantity("platform.center_of_mass_m[2]", "m", |machine, _| machine.platform.center_of_mass.y),
+    quantity("platform.center_of_mass_m[3]", "m", |machine, _| machine.platform.center_of_mass.z),
+    quantity("platform.inertia_kg_m2.xx", "kg m^2", |machine, _| machine.platform.inertia.m11),
+    quantity("platform.inertia_kg_m2.yy", "kg m^2", |machine, _| machine.platform.inertia.m22),
+    quantity("platform.inertia_kg_m2.zz", "kg m^2", |machine, _| machine.platform.inertia.m33),
+    quantity("platform.inertia_kg_m2.xy", "kg m^2", |machine, _| machine.platform.inertia.m12),
+    quantity("platform.inertia_kg_m2.xz", "kg m^2", |machine, _| machine.platform.inertia.m13),
+    quantity("platform.inertia_kg_m2.yz", "kg m^2", |machine, _| machine.platform.inertia.m23),
+    quantity("cylinder.center_of_mass_m", "m", |machine, _| machine.cylinder.center_of_mass),
+    quantity("cylinder.axial_inertia_kg_m2", "kg m^2", |machine, _| machine.cylinder.axial_inertia),
+    quantity("rod.mass_kg", "kg", |machine, _| machine.rod.mass),
+    quantity("rod.center_of_mass_m", "m", |machine, _| machine.rod.center_of_mass),
+    quantity("rod.axial_inertia_kg_m2", "kg m^2", |machine, _| machine.rod.axial_inertia),
+    quantity("transverse inertia of both links", "kg m^2", |machine, _| {
+        machine.cylinder.transverse_inertia.constant + machine.rod.transverse_inertia.constant
+    }),
+    quantity("actuator.reflected_mass_kg", "kg", |machine, _| machine.actuator.reflected_mass),
+];
+
+/// Of the payload.
+pub(super) const PAYLOAD: [Quantity; 4] = [
+    quantity("payload: mass", "kg", |_, payload| payload.mass),
+    quantity("payload: centre of mass x", "m", |_, payload| payload.center_of_mass.x),
+    quantity("payload: centre of mass y", "m", |_, payload| payload.center_of_mass.y),
+    quantity("payload: centre of mass z", "m", |_, payload| payload.center_of_mass.z),
+];
+
+/// A number of each leg: key of the machine file, unit, values.
+pub(super) type LegQuantity = (&'static str, &'static str, fn(&Machine) -> &[f64; LEGS]);
+
+/// Of each drive.
+pub(super) const LEG_QUANTITIES: [LegQuantity; 4] = [
+    ("actuator.viscous_friction_n_s_m", "N s/m", |machine| &machine.actuator.viscous_friction),
+    ("actuator.coulomb_friction_n", "N", |machine| &machine.actuator.coulomb_friction),
+    ("actuator.load_friction", "", |machine| &machine.actuator.load_friction),
+    ("actuator.force_scale", "", |machine| &machine.actuator.force_scale),
+];

@@ -1,0 +1,90 @@
+//! Cycles under control in recordings, as the identification needs them.
+
+use std::path::{Path, PathBuf};
+
+use super::IdentifyError;
+use crate::analysis::drive_delay::{MeasuredMotion, RecordedStretch, SentForce};
+use crate::commands::failure::Failure;
+use crate::config::Config;
+use crate::messages::CycleMessage;
+use crate::recording::Item;
+use crate::recording::reader::Recording;
+
+/// Stretches of recordings, and the configuration in force: that of the newest.
+#[derive(Default)]
+pub(super) struct Recorded {
+    /// Configuration and its text.
+    pub configuration: Option<(Config, String)>,
+}
+
+impl Recorded {
+    /// Reads recordings of one machine.
+    pub fn read(&mut self, paths: &[PathBuf]) -> Result<Vec<RecordedStretch>, Failure> {
+        let mut stretches = vec![];
+        for path in paths {
+            stretches.append(&mut self.read_one(path)?);
+        }
+        Ok(stretches)
+    }
+
+    fn read_one(&mut self, path: &Path) -> Result<Vec<RecordedStretch>, Failure> {
+        let mut reader = StretchReader::default();
+        let summary = Recording::open(path)?.each(|item| match item {
+            Item::Cycle(cycle) => reader.add(&cycle),
+            Item::Gap(_) => reader.end(),
+            Item::Memory { .. } => {}
+        })?;
+        reader.end();
+        let text = summary.info.configuration;
+        let config = Config::parse(&text, "configuration of the recording")?;
+        if let Some((other, _)) = self.configuration.as_ref().filter(|(other, _)| other.name != config.name) {
+            return Err(IdentifyError::TwoMachines(other.name.clone(), config.name).into());
+        }
+        self.configuration = Some((config, text));
+        Ok(reader.stretches)
+    }
+}
+
+/// Reader that collects cycles under control.
+#[derive(Default)]
+struct StretchReader {
+    stretches: Vec<RecordedStretch>,
+    current: RecordedStretch,
+    /// Number of the last cycle, and its count of missed measurements.
+    last: Option<(u64, u64)>,
+}
+
+impl StretchReader {
+    fn add(&mut self, cycle: &CycleMessage) {
+        let (Some(input), Some(output)) = (cycle.input(), cycle.output()) else { return self.end() };
+        let continues = self.last.is_some_and(|(number, _)| number + 1 == cycle.cycle);
+        if !output.state.has_control() || !continues {
+            self.end();
+        }
+        let missed = self.last.is_some_and(|(_, missed)| missed != output.missed_measurements);
+        self.last = Some((cycle.cycle, output.missed_measurements));
+        if !output.state.has_control() {
+            return;
+        }
+        let RecordedStretch { sent, measured } = &mut self.current;
+        sent.push(SentForce { release_ns: input.release_ns, force: output.force });
+        let (Some(measurement), Some(platform), Some(reference)) =
+            (input.measurement, output.platform, output.reference)
+        else {
+            return;
+        };
+        let is_new = measured.last().is_none_or(|last| last.time_ns < measurement.time_ns);
+        if is_new && !missed {
+            let (time_ns, length) = (measurement.time_ns, measurement.length);
+            measured.push(MeasuredMotion { time_ns, length, pose: platform.pose, reference });
+        }
+    }
+
+    fn end(&mut self) {
+        self.last = None;
+        let stretch = core::mem::take(&mut self.current);
+        if !stretch.sent.is_empty() {
+            self.stretches.push(stretch);
+        }
+    }
+}
