@@ -68,7 +68,7 @@ impl fmt::Display for Bound {
 }
 
 /// Number of a value: a float, or an integer of at most 128 bits.
-pub(super) fn number(value: &DeValue) -> Option<f64> {
+pub fn number(value: &DeValue) -> Option<f64> {
     match value {
         DeValue::Integer(x) => i128::from_str_radix(x.as_str(), x.radix()).ok().map(|x| x as f64),
         DeValue::Float(x) => x.as_str().parse().ok(),

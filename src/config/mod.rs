@@ -18,6 +18,7 @@ use tracing::warn;
 use crate::messages::{Bus, PortError};
 use crate::model::machine::{Machine, at_most_256_bits};
 
+pub use self::bound::number;
 use self::deployment::Deployment;
 use self::reader::{SectionReader, ViolationLog};
 

@@ -258,8 +258,7 @@ impl Actuator {
 
     /// sign(L') of dry friction, proportional to L' below the smoothing speed.
     pub fn sign(&self, rate: f64) -> f64 {
-        // Not `clamp`, which may panic.
-        (rate / self.coulomb_smoothing).max(-1.0).min(1.0)
+        (rate / self.coulomb_smoothing).clamp(-1.0, 1.0)
     }
 
     /// Length of the stroke \[m\].

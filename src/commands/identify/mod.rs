@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use self::machine_file::{MachineFileError, changed_margins, difference, edited, write_new};
+use self::new_values::new_values;
 use self::recordings::Recorded;
 use self::report::{Delay, IdentificationReport};
 use super::failure::{CommandError, Failure};
@@ -12,6 +14,8 @@ use crate::analysis::identification::{Load, Run, identify, samples};
 use crate::config::Config;
 use crate::output::files::{print, print_json};
 
+mod machine_file;
+mod new_values;
 mod quantities;
 mod recordings;
 mod report;
@@ -48,6 +52,9 @@ pub struct IdentifyArguments {
     /// Recordings of another motion, whose forces are predicted before and after
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     validate: Vec<PathBuf>,
+    /// New machine file with the result; a payload is then a part of the platform
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -66,6 +73,8 @@ pub enum IdentifyError {
     Weight,
 }
 
+impl CommandError for MachineFileError {}
+
 impl CommandError for IdentifyError {
     fn has_begun(&self) -> bool {
         true
@@ -74,21 +83,11 @@ impl CommandError for IdentifyError {
 
 impl IdentifyArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let report = self.report()?;
-        if self.json {
-            print_json(&report)?
-        } else {
-            print(&report)?
-        }
-        Ok(())
-    }
-
-    fn report(&self) -> Result<IdentificationReport, Failure> {
         let mut recorded = Recorded::default();
         let [empty, loaded, payload, other] =
             [&self.recordings, &self.loaded, &self.payload, &self.validate].map(|paths| recorded.read(paths));
         let (empty, loaded, payload, other) = (empty?, loaded?, payload?, other?);
-        let (config, _) = recorded.configuration.ok_or(IdentifyError::TooLittle)?;
+        let (config, text) = recorded.configuration.ok_or(IdentifyError::TooLittle)?;
         let machine = &config.machine;
         let delay = delay(&config, [&empty, &loaded, &payload].into_iter().flatten().cloned().collect());
         let runs_of = |stretches: &[RecordedStretch], load: Load| -> Vec<Run> {
@@ -99,7 +98,23 @@ impl IdentifyArguments {
             .concat();
         let found = identify(machine, &runs, self.recordings.is_empty()).ok_or(IdentifyError::TooLittle)?;
         let validation = runs_of(&other, Load::Empty);
-        Ok(IdentificationReport::new(&config, &found, &runs, &validation, delay))
+        let report = IdentificationReport::new(&config, &found, &runs, &validation, delay);
+        match self.json {
+            true => print_json(&report)?,
+            false => print(&report)?,
+        }
+        let Some(path) = &self.output else { return Ok(()) };
+        let new = edited(&text, &new_values(&found, !self.payload.is_empty(), &delay))?;
+        let changed = Config::parse(&new, "the new machine file")?;
+        write_new(path, &new)?;
+        if !self.json {
+            let (lines, margins) = (difference(&text, &new), changed_margins(&config, &changed).join("\n"));
+            print(format_args!(
+                "\n{lines}\nhexad check, before and after:\n\n{margins}\n\n{}: written\n",
+                path.display()
+            ))?;
+        }
+        Ok(())
     }
 
     fn known_weight(&self) -> Result<Load, IdentifyError> {
