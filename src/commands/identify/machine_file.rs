@@ -23,6 +23,9 @@ mod estimate;
 #[cfg(test)]
 mod tests;
 
+/// Type of a value that a new value replaces.
+const NUMERIC: &str = "a number or an array of numbers";
+
 /// Error of writing a new machine file.
 #[derive(Debug, thiserror::Error)]
 pub enum MachineFileError {
@@ -130,7 +133,7 @@ impl<'t> Edits<'t> {
             };
             let DeValue::Table(table) = value.get_ref() else {
                 let is_last = depth + 1 == new.path.len();
-                let expected = if is_last { "a number or an array of numbers" } else { "a table" };
+                let expected = if is_last { NUMERIC } else { "a table" };
                 let replaced = if is_last { self.replace(&place, new, value) } else { None };
                 let found = value.get_ref().type_str();
                 return replaced.ok_or_else(|| MachineFileError::Type { key: key(), found, expected });
@@ -138,11 +141,7 @@ impl<'t> Edits<'t> {
             let inline = self.is_inline(value).then(|| (value.span().end, depth + 1));
             place = Place { table, span: value.span(), inline: place.inline.or(inline) };
         }
-        Err(MachineFileError::Type {
-            key: key(),
-            found: "table",
-            expected: "a number or an array of numbers",
-        })
+        Err(MachineFileError::Type { key: key(), found: "table", expected: NUMERIC })
     }
 
     /// Replaces the numbers of a value that differ from their estimates. Returns `None` if the value is not numeric.
