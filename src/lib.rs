@@ -65,6 +65,7 @@
 //! | envelope | poses of a task, which the reference keeps, with required velocities and accelerations |
 //! | estimator | filter that gives error, its rate and the disturbance at the instant at which a force acts |
 //! | estop, off | operator requests that disable forces at once; after estop until `clear` |
+//! | excitation | periodic motion from which masses, friction and the delay of the drives can be identified |
 //! | fault | state without valid forces until an operator clears it |
 //! | fidelity | which terms of the dynamics the model evaluates, from `gravity` to `exact`, see [`model::fidelity`] |
 //! | fit | shrinking a built-in motion until stroke, rates and forces keep a reserve |

@@ -2,6 +2,7 @@
 
 mod common;
 
+mod excitation;
 mod fidelity;
 mod identification;
 mod ladder;

@@ -9,6 +9,7 @@
 //! | other poses with the same leg lengths | [`assembly_modes`] |
 //! | parameters of a machine from recorded motions | [`identification`], [`drive_delay`] |
 //! | how fast the platform leaves a pose under constant forces | [`held_forces`] |
+//! | motion that shows the parameters | [`excitation_design`] |
 //! | margins of a sampled loop | [`sampled_loop`] |
 //! | path of the reference to a target | [`target_motion`] |
 //! | derivatives of a motion given by poses | [`pose_spline`] |
@@ -22,6 +23,7 @@ pub mod clearance;
 pub mod drive_capability;
 pub mod drive_delay;
 pub mod envelope;
+pub mod excitation_design;
 pub mod fidelity_choice;
 pub mod fidelity_error;
 pub mod held_forces;

@@ -12,6 +12,7 @@ use self::check::CheckArguments;
 use self::convert::ConvertArguments;
 use self::demo::DemoArguments;
 use self::doctor::DoctorArguments;
+use self::excite::ExciteArguments;
 use self::export::ExportArguments;
 use self::failure::Failure;
 use self::faults::FaultTables;
@@ -44,6 +45,7 @@ pub mod check;
 mod convert;
 pub mod demo;
 pub mod doctor;
+mod excite;
 pub mod export;
 mod failure;
 pub mod faults;
@@ -90,6 +92,8 @@ enum CommandArguments {
     Plant(MachineFile),
     /// Play a motion or a trajectory as a setpoint source
     Move(MoveArguments),
+    /// Play a motion from which masses, friction and the delay of the drives can be identified
+    Excite(ExciteArguments),
     /// Move the platform to a pose and hold it there under control
     Goto(GotoArguments),
     /// Keep the platform under control where it is, until Ctrl-C; then stop
@@ -156,6 +160,7 @@ impl CommandLine {
             Is::Run(arguments) => arguments.execute(),
             Is::Plant(machine) => Ok(plant::run(&machine.load()?, &Stop::on_signals()?)?),
             Is::Move(arguments) => arguments.execute(),
+            Is::Excite(arguments) => arguments.execute(),
             Is::Goto(arguments) => arguments.execute(),
             Is::Hold(arguments) => arguments.execute(),
             Is::Jog(arguments) => arguments.execute(),

@@ -188,16 +188,19 @@ pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMot
 /// Whether stroke, rates and forces keep their reserve, on a thousand samples.
 fn has_reserve(model: &InverseDynamics, fitted: &FittedMotion) -> bool {
     const SAMPLES: u32 = 1000;
-    let machine = model.machine();
+    (0..=SAMPLES)
+        .all(|k| keeps_reserve(model, &fitted.at(fitted.duration * f64::from(k) / f64::from(SAMPLES))))
+}
+
+/// Whether stroke, rates and forces keep a reserve of a fifth at one state; false at a singular pose.
+pub fn keeps_reserve(model: &InverseDynamics, state: &TaskState) -> bool {
+    let (machine, motion) = (model.machine(), state.motion());
     let actuator = &machine.actuator;
     let margin = 0.5 * (1.0 - USABLE_SHARE) * actuator.stroke();
-    let stroke = (actuator.min_length + margin)..=(actuator.max_length - margin);
-    (0..=SAMPLES).all(|k| {
-        let motion = fitted.at(fitted.duration * f64::from(k) / f64::from(SAMPLES)).motion();
-        let legs = leg_motion(machine, &motion);
-        let force = model.forces::<Exact>(&motion);
-        legs.length.iter().all(|length| stroke.contains(length))
-            && legs.rate.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate)
-            && force.is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.available_force()))
-    })
+    let legs = leg_motion(machine, &motion);
+    legs.length.iter().all(|length| actuator.margin(*length) >= margin)
+        && legs.rate.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate)
+        && model
+            .forces::<Exact>(&motion)
+            .is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.available_force()))
 }

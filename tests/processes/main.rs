@@ -25,6 +25,7 @@ mod control_socket;
 mod doctor;
 mod doubted;
 mod examined;
+mod excite;
 mod fidelity;
 mod hosted;
 mod in_force;

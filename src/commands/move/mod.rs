@@ -56,8 +56,15 @@ pub struct MoveArguments {
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
+    #[command(flatten)]
+    playback: PlaybackOptions,
+}
+
+/// Options of commands that play a trajectory.
+#[derive(Debug, Args)]
+pub struct PlaybackOptions {
     /// At the end of the motion, leave the platform standing under control at the last pose
-    #[arg(long, conflicts_with_all = ["pause", "resume"])]
+    #[arg(long)]
     hold: bool,
     /// Also request control, once, as soon as the setpoints hold the pose of the platform
     #[arg(long)]
@@ -65,6 +72,14 @@ pub struct MoveArguments {
     /// Longest to wait for control [s]
     #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
     within: f64,
+}
+
+impl PlaybackOptions {
+    /// Plays the trajectory once.
+    pub fn play(&self, config: &Config, trajectory: &Trajectory) -> Result<(), Failure> {
+        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
+        Ok(run(config, trajectory, self.hold, within, &Stop::on_signals()?)?)
+    }
 }
 
 #[derive(Debug, Args)]
@@ -81,10 +96,10 @@ struct TrajectorySource {
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
     /// Let the player that runs slow down along its path, to rest under control
-    #[arg(long)]
+    #[arg(long, conflicts_with = "hold")]
     pause: bool,
     /// Let a paused player go on along its path
-    #[arg(long)]
+    #[arg(long, conflicts_with = "hold")]
     resume: bool,
 }
 
@@ -100,8 +115,7 @@ impl MoveArguments {
                 Trajectory::built_in(&config, motion.unwrap_or(BuiltInMotion::Settle), self.seconds)?
             }
         };
-        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
-        Ok(run(&config, &trajectory, self.hold, within, &Stop::on_signals()?)?)
+        self.playback.play(&config, &trajectory)
     }
 }
 
@@ -114,10 +128,14 @@ pub enum SetpointError {
     Table(#[from] TableError),
     #[error(
         "{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}",
-        name = .motion.name(),
         share = percent(MIN_AMPLITUDE_SHARE)
     )]
-    TooSmall { motion: BuiltInMotion, seconds: f64, refusal: SetpointRefusal },
+    TooSmall { name: &'static str, seconds: f64, refusal: SetpointRefusal },
+    #[error(
+        "no motion about home within the limits shows the parameters: home must be further from the ends of the stroke and from the \
+         bounds of [envelope], or --amplitude larger"
+    )]
+    NotExciting,
 }
 
 impl CommandError for SetpointError {}

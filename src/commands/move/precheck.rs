@@ -64,6 +64,14 @@ impl<'a> Precheck<'a> {
         self
     }
 
+    /// Whether a setpoint keeps the limits at its instant, those of the pose included.
+    pub fn keeps_limits(&self, state: &TaskState) -> bool {
+        let setpoint = SetpointMotion::new(Setpoint::motion(0, *state));
+        let kinematic_state = KinematicState::new(self.machine, setpoint.motion.pose);
+        check_setpoint(self.machine, &self.parameters, &setpoint, &mut LimitSet::default()).is_ok()
+            && kinematic_state.sensitivity().condition <= self.parameters.condition
+    }
+
     /// The first setpoint from `from` to `to` that the daemon would refuse, if it followed the trajectory
     /// from `from` on.
     pub fn refusal(&self, at: impl Fn(f64) -> TaskState, span: [f64; 2]) -> Option<SetpointRefusal> {

@@ -1,4 +1,4 @@
-//! Trajectory of a setpoint source: a built-in motion, or the rows of a file.
+//! Trajectory of a setpoint source: a built-in motion, an excitation, or the rows of a file.
 
 use core::ops::ControlFlow;
 use std::path::Path;
@@ -7,11 +7,13 @@ use tracing::info;
 
 use super::SetpointError;
 use super::precheck::Precheck;
+use crate::analysis::excitation_design::design;
 use crate::analysis::sampled_loop::edge;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::config::Config;
 use crate::model::task::TaskState;
 use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
+use crate::motion::excitation::Excitation;
 use crate::motion::trajectory::{Knot, interpolate};
 use crate::output::csv_table::{NumberTable, TableError, TableErrors};
 use crate::output::files::name_of;
@@ -27,31 +29,52 @@ const MAX_WAY_RATIO: f64 = 30.0;
 /// Smallest amplitude of a built-in motion, as a share of its usual one. A smaller motion is invisible.
 pub(super) const MIN_AMPLITUDE_SHARE: f64 = 1e-3;
 
+/// Duration of the fast motion at the end of an excitation, which shows the delay of the drives \[s\].
+const DELAY_MOTION_S: f64 = 10.0;
+
 /// X, X', X'' as a function of time, from rest to rest.
 #[derive(Clone, Debug)]
 pub enum Trajectory {
     BuiltIn(FittedMotion),
+    Excitation(Box<Excitation>),
     Knots(Vec<Knot>),
 }
 
 impl Trajectory {
     /// A built-in motion, as large as the drives allow and the daemon accepts.
     pub fn built_in(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, SetpointError> {
-        let precheck = Precheck::new(config).with_reserve();
+        Ok(Self::BuiltIn(Self::fitted(config, motion, seconds)?))
+    }
+
+    fn fitted(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<FittedMotion, SetpointError> {
         let largest = fit(&config.machine, motion, seconds);
-        let refusal = |scene: &FittedMotion| precheck.refusal(|t| scene.at(t), [0.0, seconds]);
-        let Some(too_large) = refusal(&largest) else { return Ok(Self::BuiltIn(largest)) };
-        let smallest = largest.smaller(MIN_AMPLITUDE_SHARE / largest.angle_share);
-        if let Some(refusal) = refusal(&smallest) {
-            return Err(SetpointError::TooSmall { motion, seconds, refusal });
-        }
-        let share = edge(0.0, 1.0, |share| refusal(&largest.smaller(share)).is_none());
-        info!(
-            "{} with {} of the amplitude that the drives carry: with more, at {too_large}",
-            motion.name(),
-            percent(share)
-        );
-        Ok(Self::BuiltIn(largest.smaller(share)))
+        let smallest = MIN_AMPLITUDE_SHARE / largest.angle_share;
+        let sized = |share| {
+            let motion = largest.smaller(share);
+            move |t| motion.at(t)
+        };
+        Ok(largest.smaller(accepted_share(config, motion.name(), seconds, smallest, sized)?))
+    }
+
+    /// An excitation of so many counted periods, with a share of the largest amplitude that drives and daemon accept.
+    pub fn excitation(
+        config: &Config,
+        periods: u32,
+        amplitude: f64,
+        seed: u64,
+    ) -> Result<Excitation, SetpointError> {
+        let machine = &config.machine;
+        let precheck = Precheck::new(config).with_reserve();
+        let design = design(machine, amplitude, seed, |state| precheck.keeps_limits(state))
+            .ok_or(SetpointError::NotExciting)?;
+        let delay_motion = Self::fitted(config, BuiltInMotion::Sines, DELAY_MOTION_S)?.smaller(amplitude);
+        let largest = Excitation::new(machine, design.series, periods, delay_motion);
+        let sized = |share| {
+            let motion = largest.smaller(share);
+            move |t| motion.at(t)
+        };
+        let share = accepted_share(config, "excitation", largest.duration(), MIN_AMPLITUDE_SHARE, sized)?;
+        Ok(largest.smaller(share))
     }
 
     /// A trajectory from a CSV file. It must begin and end at rest, its times must increase, and the daemon
@@ -120,6 +143,7 @@ impl Trajectory {
     pub fn duration(&self) -> f64 {
         match self {
             Self::BuiltIn(scene) => scene.duration,
+            Self::Excitation(excitation) => excitation.duration(),
             Self::Knots(knots) => knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t),
         }
     }
@@ -128,11 +152,32 @@ impl Trajectory {
     pub fn at(&self, t: f64) -> TaskState {
         match self {
             Self::BuiltIn(scene) => scene.at(t),
+            Self::Excitation(excitation) => excitation.at(t),
             Self::Knots(knots) => {
                 interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
             }
         }
     }
+}
+
+/// Largest share of a motion's amplitude, at most 1, with which the daemon accepts the whole motion with reserve. `sized`
+/// returns the motion with a share of its amplitude; `smallest` is the least share.
+fn accepted_share<M: Fn(f64) -> TaskState>(
+    config: &Config,
+    name: &'static str,
+    seconds: f64,
+    smallest: f64,
+    sized: impl Fn(f64) -> M,
+) -> Result<f64, SetpointError> {
+    let precheck = Precheck::new(config).with_reserve();
+    let refusal = |share: f64| precheck.refusal(sized(share), [0.0, seconds]);
+    let Some(too_large) = refusal(1.0) else { return Ok(1.0) };
+    if let Some(refusal) = refusal(smallest) {
+        return Err(SetpointError::TooSmall { name, seconds, refusal });
+    }
+    let share = edge(0.0, 1.0, |share| refusal(share).is_none());
+    info!("{name} with {} of the amplitude that the drives carry: with more, at {too_large}", percent(share));
+    Ok(share)
 }
 
 /// Ratio of the distance from the rates to the distance between the poses, if it is too large for one motion.
