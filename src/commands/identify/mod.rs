@@ -37,15 +37,8 @@ pub struct IdentifyArguments {
     #[arg(long, value_name = "KG", requires = "loaded")]
     known_mass: Option<f64>,
     /// Its centre of mass, in platform axes [m]
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_hyphen_values = true,
-        requires = "loaded"
-    )]
-    at: Vec<f64>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, requires = "loaded")]
+    at: Option<[f64; 3]>,
     /// Recordings with a payload that is to be identified; without other recordings the machine is as its file says
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     payload: Vec<PathBuf>,
@@ -69,8 +62,8 @@ pub enum IdentifyError {
     TooLittle,
     #[error("recordings of two machines: {0} and {1}; identify each alone")]
     TwoMachines(String, String),
-    #[error("--known-mass must be greater than 0, and --at within 100 m")]
-    Weight,
+    #[error("--known-mass = {0} kg: must be greater than 0")]
+    Weight(f64),
 }
 
 impl CommandError for MachineFileError {}
@@ -118,15 +111,19 @@ impl IdentifyArguments {
     }
 
     fn known_weight(&self) -> Result<Load, IdentifyError> {
-        match (self.known_mass, self.at.as_slice()) {
-            (Some(mass), [x, y, z]) => {
-                let at = [*x, *y, *z];
-                let is_valid = mass > 0.0 && mass.is_finite() && at.iter().all(|x| x.abs() < 100.0);
-                if is_valid { Ok(Load::Known { mass, at }) } else { Err(IdentifyError::Weight) }
-            }
-            _ => Ok(Load::Empty),
-        }
+        let (Some(mass), Some(at)) = (self.known_mass, self.at) else { return Ok(Load::Empty) };
+        let is_valid = mass > 0.0 && mass.is_finite();
+        if is_valid { Ok(Load::Known { mass, at }) } else { Err(IdentifyError::Weight(mass)) }
     }
+}
+
+/// A place: three numbers with commas between them.
+fn place(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
+    let place = numbers.ok().and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    place
+        .filter(|place| place.iter().all(|x| x.is_finite()))
+        .ok_or_else(|| "must be three numbers, such as 0.3,-0.2,0.8".into())
 }
 
 /// Delay of the drives: from the motion if that shows it, else of the file.
