@@ -19,7 +19,7 @@ use crate::motion::excitation::{Excitation, PERIOD_S};
 use crate::output::csv_table::trajectory_columns;
 use crate::output::csv_writer::CsvWriter;
 use crate::output::files::{is_standard, print};
-use crate::output::numbers::{percent, significant};
+use crate::output::numbers::{percent, plain_percent, significant};
 use crate::output::text_table::{Left, Right, text_table};
 
 /// Noise of the forces for which deviations are predicted, as a ratio of `actuator.max_force_n`, and its rate \[Hz\].
@@ -104,7 +104,7 @@ fn summary(config: &Config, excitation: &Excitation) -> String {
         excitation.duration(),
         excitation.periods(),
         significant(sensitivities.condition),
-        percent(NOISE_RATIO)
+        plain_percent(NOISE_RATIO)
     )
 }
 
@@ -117,8 +117,8 @@ fn shown(machine: &Machine, deviations: &[(usize, f64)]) -> impl Iterator<Item =
         ("first moment y", "kg m", 2..3),
         ("first moment z", "kg m", 3..4),
         ("reflected mass of a drive", "kg", REFLECTED..REFLECTED + 1),
-        ("viscous friction of a leg, worst", "N s/m", VISCOUS..VISCOUS + LEGS),
-        ("Coulomb friction of a leg, worst", "N", COULOMB..COULOMB + LEGS),
+        ("viscous friction of a leg (worst of six)", "N s/m", VISCOUS..VISCOUS + LEGS),
+        ("Coulomb friction of a leg (worst of six)", "N", COULOMB..COULOMB + LEGS),
     ];
     rows.into_iter().filter_map(move |(name, unit, of)| {
         let worst = deviations.iter().filter(|(k, _)| of.contains(k)).max_by(|a, b| a.1.total_cmp(&b.1));

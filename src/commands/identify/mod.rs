@@ -12,6 +12,7 @@ use super::failure::{CommandError, Failure};
 use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
 use crate::analysis::identification::{Load, Run, identify, samples};
 use crate::config::Config;
+use crate::model::machine::Machine;
 use crate::output::files::{print, print_json};
 
 mod machine_file;
@@ -82,15 +83,24 @@ impl IdentifyArguments {
         let (empty, loaded, payload, other) = (empty?, loaded?, payload?, other?);
         let (config, text) = recorded.configuration.ok_or(IdentifyError::TooLittle)?;
         let machine = &config.machine;
-        let delay = delay(&config, [&empty, &loaded, &payload].into_iter().flatten().cloned().collect());
-        let runs_of = |stretches: &[RecordedStretch], load: Load| -> Vec<Run> {
-            stretches.iter().map(|stretch| Run { samples: samples(stretch, delay.used_s), load }).collect()
-        };
         let known = self.known_weight()?;
-        let runs = [runs_of(&empty, Load::Empty), runs_of(&loaded, known), runs_of(&payload, Load::Payload)]
-            .concat();
-        let found = identify(machine, &runs, self.recordings.is_empty()).ok_or(IdentifyError::TooLittle)?;
-        let validation = runs_of(&other, Load::Empty);
+        let runs = |delay_s: f64| {
+            [
+                runs_of(&empty, Load::Empty, delay_s),
+                runs_of(&loaded, known, delay_s),
+                runs_of(&payload, Load::Payload, delay_s),
+            ]
+            .concat()
+        };
+        let holds_machine = self.recordings.is_empty();
+        let identified =
+            |runs: &[Run]| identify(machine, runs, holds_machine).ok_or(IdentifyError::TooLittle);
+        // The delay shows once masses and friction are about right, and these are exact once the delay is.
+        let first = identified(&runs(config.deployment.drive.total_delay_s()))?;
+        let delay = delay(&config, &first.machine, &empty);
+        let runs = runs(delay.used_s);
+        let found = identified(&runs)?;
+        let validation = runs_of(&other, Load::Empty, delay.used_s);
         let report = IdentificationReport::new(&config, &found, &runs, &validation, delay);
         match self.json {
             true => print_json(&report)?,
@@ -126,9 +136,18 @@ fn place(text: &str) -> Result<[f64; 3], String> {
         .ok_or_else(|| "must be three numbers, such as 0.3,-0.2,0.8".into())
 }
 
-/// Delay of the drives: from the motion if that shows it, else of the file.
-fn delay(config: &Config, stretches: Vec<RecordedStretch>) -> Delay {
-    let shown = drive_delay(&config.machine, &stretches).filter(|found| {
+fn runs_of(stretches: &[RecordedStretch], load: Load, delay_s: f64) -> Vec<Run> {
+    stretches.iter().map(|stretch| Run { samples: samples(stretch, delay_s), load }).collect()
+}
+
+/// Delay of the drives: from the motion of a machine without load if that shows it, else of the file.
+fn delay(config: &Config, machine: &Machine, stretches: &[RecordedStretch]) -> Delay {
+    let mut stretches = stretches.to_vec();
+    for sent in stretches.iter_mut().flat_map(|stretch| &mut stretch.sent) {
+        sent.force.iter_mut().zip(machine.actuator.force_scale).for_each(|(force, scale)| *force *= scale);
+    }
+    let found = drive_delay(machine, &stretches);
+    let shown = found.filter(|found| {
         let Estimate { delay_s, deviation_s } = found.mean;
         2.0 * deviation_s <= MAX_DELAY_DEVIATION_S.max(MAX_DELAY_RATIO * delay_s)
     });
