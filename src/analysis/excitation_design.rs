@@ -1,13 +1,13 @@
 //! Design of an excitation: the Fourier series with which least squares determines the parameters best.
 //!
-//! The forces are `Gamma = Y p` ([regressor](crate::model::regressor)). Stacked over the instants of one period, with each
-//! column divided by its norm, Y has a condition: the factor by which relative errors of the forces can grow in p. The design
-//! draws random series and improves them by differential evolution (Storn, Price, 1997), because hill climbing from the best one
-//! ends where the active limit changes. Each series is as large as the limits allow.
+//! The forces are `Gamma = Y p` ([regressor](crate::model::regressor)). Y of the instants of one period, each column
+//! divided by its norm, has a condition: the factor by which relative errors of the forces can grow in p. The design
+//! draws random series and improves them by differential evolution (Storn, Price, 1997). Hill climbing from the best
+//! one ends where the active limit changes. Each series is as large as the limits allow.
 //!
-//! The condition is over the *base parameters*, whose effects differ: of each indistinguishable pair only the first, which
-//! stands for the sum; the rod's mass as points of the platform at the `B_i`; a quadratic part of the transverse inertia only
-//! where the machine has one.
+//! The condition is over the *base parameters*, whose effects differ. Of each indistinguishable pair the first one
+//! stands for the sum. The rods' masses are points of the platform at the `B_i`. A quadratic part of the transverse
+//! inertia is a parameter only where the machine has one.
 //!
 //! Source: Swevers et al. (1997), "Optimal robot excitation and identification"; Gautier (1991), base parameters.
 
@@ -61,8 +61,8 @@ pub struct ExcitationDesign {
     pub random_conditions: Vec<f64>,
 }
 
-/// Series with a small condition, `amplitude` times as large as drives and `is_allowed` permit, while it blends in and out
-/// too. The same seed gives the same series. `None` if no random series determines the parameters.
+/// Series with a small condition, `amplitude` times as large as drives and `is_allowed` permit, also while it blends in
+/// and out. The same seed gives the same series. `None` if no random series determines the parameters.
 pub fn design(
     machine: &Machine,
     amplitude: f64,
@@ -133,7 +133,8 @@ fn pairs(machine: &Machine) -> impl Iterator<Item = [usize; 2]> {
     INDISTINGUISHABLE_PAIRS.into_iter().chain((cylinder == rod).then_some(QUADRATIC))
 }
 
-/// Value of each parameter as a base parameter: sums of pairs, and the rods' masses as points of the platform at the `B_i`.
+/// Value of each parameter as a base parameter: sums of pairs, and the rods' masses as points of the platform at the
+/// `B_i`.
 pub fn base_values(machine: &Machine) -> InertialParameters {
     let mut values = inertial_parameters(machine);
     let rod_mass = values.get(ROD_MASS).copied().unwrap_or_default();

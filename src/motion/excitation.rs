@@ -27,7 +27,8 @@ pub const HARMONICS: usize = 5;
 /// Time in which the periodic motion blends in, and out again \[s\].
 pub const BLEND_S: f64 = 2.0;
 
-/// Coefficients of a Fourier series: a row per task coordinate; a column per harmonic for `a`, then for `b` \[rad\], \[m\].
+/// Coefficients of a Fourier series: a row per task coordinate; a column per harmonic for `a`, then for `b`
+/// \[rad\], \[m\].
 pub type Coefficients = SMatrix<f64, 6, { 2 * HARMONICS }>;
 
 /// Periodic displacement of X from home, `sum_k ( a_k cos(k w t) + b_k sin(k w t) )`.
@@ -65,7 +66,7 @@ impl FourierSeries {
 /// series.0[(5, 5)] = 0.1;
 /// let excitation = Excitation::new(&machine, series, 3, fit(&machine, BuiltInMotion::Sines, 10.0));
 /// assert_eq!((excitation.counted_periods(), excitation.duration()), ([2.0, 32.0], 44.0));
-/// assert_eq!(excitation.at(0.0).x, machine.home.into());
+/// assert_eq!(excitation.at(0.0).x, nalgebra::Vector6::from(machine.home));
 /// assert!((excitation.at(5.0).x - excitation.at(25.0).x).norm() < 1e-14);
 /// ```
 #[derive(Clone, Copy, Debug)]

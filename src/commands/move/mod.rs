@@ -132,8 +132,8 @@ pub enum SetpointError {
     )]
     TooSmall { name: &'static str, seconds: f64, refusal: SetpointRefusal },
     #[error(
-        "no motion about home within the limits shows the parameters: home must be further from the ends of the stroke and from the \
-         bounds of [envelope], or --amplitude larger"
+        "no motion about home within the limits shows the parameters: home must be further from the ends \
+         of the stroke and from the bounds of [envelope], or --amplitude larger"
     )]
     NotExciting,
 }

@@ -160,8 +160,8 @@ impl Trajectory {
     }
 }
 
-/// Largest share of a motion's amplitude, at most 1, with which the daemon accepts the whole motion with reserve. `sized`
-/// returns the motion with a share of its amplitude; `smallest` is the least share.
+/// Largest share of a motion's amplitude, at most 1, with which the daemon accepts the whole motion with reserve.
+/// `sized` returns the motion with a share of its amplitude; `smallest` is the least share.
 fn accepted_share<M: Fn(f64) -> TaskState>(
     config: &Config,
     name: &'static str,
