@@ -5,7 +5,7 @@
 //! each held until the next: both means are exact, whatever the instants of the samples. For each leg i
 //!
 //! ```text
-//! mean of Gamma_i(t - D_i) = model_i + Y_i p + viscous_i L'_i + coulomb_i sign(L'_i) + offset_i
+//! mean of Gamma_i(t - D_i) = model_i + Y_i p + viscous_i L'_i + (coulomb_i + load_i |model_i|) sign(L'_i) + offset_i
 //! ```
 //!
 //! model: inverse dynamics of the measured motion, without friction; Y p: forces of a payload, by the
@@ -15,7 +15,8 @@
 //! "Instrumental Variable Methods for System Identification", 1983), and solved for the delays by Newton's method.
 //!
 //! A lag of the drives counts as a delay, as it does in the estimator; so do sensors whose stamps are late. Stiction is not
-//! modelled, nor is a wrong mass of the legs: both matter less the faster the motion.
+//! modelled, but legs that nearly stand do not count. A wrong mass of the legs is not modelled, and matters less the faster the
+//! motion.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
@@ -91,13 +92,17 @@ const MIN_INSTANTS_PER_PART: usize = 50;
 /// Newton steps: three suffice.
 const MAX_STEPS: u32 = 20;
 const CONVERGED_S: f64 = 1e-7;
+/// Rate below which a leg nearly stands \[m/s\]: three times the Stribeck speed of a usual drive, or this ratio of
+/// the largest rate, if that is less.
+const STANDING_M_S: f64 = 0.03;
+const STANDING_RATIO: f64 = 0.05;
 /// Rate at which Coulomb friction has its whole force \[m/s\].
 const FRICTION_SMOOTHING_M_S: f64 = 1e-3;
 
 /// Unknowns of all legs: mass, first moments and inertia of the platform.
 const COMMON: usize = 10;
-/// Unknowns of a leg: delay, viscous and Coulomb friction, offset.
-const OWN: usize = 4;
+/// Unknowns of a leg: delay, viscous, Coulomb and load friction, offset.
+const OWN: usize = 5;
 const TERMS: usize = COMMON + OWN;
 const UNKNOWNS: usize = COMMON + LEGS * OWN;
 /// What the unknowns in the equation of a leg are multiplied by: the common ones, then its own.
@@ -204,17 +209,26 @@ impl Instant {
         let motion = Motion { acceleration: Acceleration::from_vector(&acceleration), ..coasting };
         let force = |sample: &MeasuredMotion| model.forces::<Exact>(&sample.reference).map(Vector6::from);
         let force_rate = (force(last)? - force(first)?) / (last.time_ns - first.time_ns) as f64 * 1e9;
-        Some(Self {
-            times,
-            model: model.forces::<Exact>(&motion)?.into(),
-            measured: terms(machine, &motion, &Vector6::zeros())?,
-            instruments: terms(machine, &middle.reference, &force_rate)?,
-        })
+        let modelled = model.forces::<Exact>(&motion)?.into();
+        let mut instruments = terms(machine, &middle.reference, (&force(middle)?, &force_rate))?;
+        // A leg that nearly stands has stiction, which would pass for a delay.
+        let standing = STANDING_M_S.min(STANDING_RATIO * machine.actuator.max_rate);
+        for (instruments, rate) in instruments.iter_mut().zip(&rate) {
+            if rate.abs() < standing {
+                *instruments = Terms::zeros();
+            }
+        }
+        let measured = terms(machine, &motion, (&modelled, &Vector6::zeros()))?;
+        Some(Self { times, model: modelled, measured, instruments })
     }
 }
 
-/// The terms of each leg in a motion with these rates of change of the forces.
-fn terms(machine: &Machine, motion: &Motion, force_rate: &Vector6<f64>) -> Option<[Terms; LEGS]> {
+/// The terms of each leg in a motion with these forces and their rates of change.
+fn terms(
+    machine: &Machine,
+    motion: &Motion,
+    (force, force_rate): (&Vector6<f64>, &Vector6<f64>),
+) -> Option<[Terms; LEGS]> {
     let regressor = regressor(machine, motion)?;
     let rates = Vector6::from(leg_motion(machine, motion).rate);
     Some(core::array::from_fn(|leg| {
@@ -225,6 +239,7 @@ fn terms(machine: &Machine, motion: &Motion, force_rate: &Vector6<f64>) -> Optio
             value(force_rate, leg),
             rate,
             sign,
+            value(force, leg).abs() * sign,
             1.0,
         ]));
         terms

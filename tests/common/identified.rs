@@ -1,6 +1,6 @@
 //! Machines that are not what their files say, and motions that show it.
 
-use hexad::analysis::identification::Identification;
+use hexad::analysis::identification::{Estimated, Identification};
 use hexad::model::machine::Machine;
 use hexad::model::random::Random;
 use hexad::model::task::TaskState;
@@ -65,31 +65,29 @@ impl Series {
     }
 }
 
-pub fn report(found: &Identification, truth: &Machine) {
-    let show = |name: &str, quantity: &dyn Fn(&Machine) -> f64| {
-        let estimate = found.estimate(|machine, _| quantity(machine));
-        println!(
-            "{name:12} {:.5} +- {:.5}, true {:.5}, {:.1} deviations; was {:.4} +- {:.4}",
-            estimate.value,
-            estimate.deviation,
-            quantity(truth),
-            (estimate.value - quantity(truth)) / estimate.deviation,
-            estimate.before,
-            estimate.expected
-        );
+/// Largest error of a parameter in its own deviations.
+pub fn worst_error(found: &Identification, truth: &Machine) -> f64 {
+    let mut worst = 0.0_f64;
+    let mut check = |name: &str, of: &dyn Fn(&Machine) -> f64| {
+        let Estimated { value, deviation, .. } = found.estimate(|machine, _| of(machine));
+        let error = (value - of(truth)) / deviation;
+        println!("{name:20} {value:.5} +- {deviation:.5}, true {:.5}: {error:.1} deviations", of(truth));
+        worst = worst.max(error.abs());
     };
-    show("m", &|machine| machine.platform.mass);
-    show("m + 6 m2", &|machine| machine.platform.mass + 6.0 * machine.rod.mass);
-    show("x", &|machine| machine.platform.center_of_mass.x);
-    show("z", &|machine| machine.platform.center_of_mass.z);
-    show("Ixx", &|machine| machine.platform.inertia.m11);
-    show("Ixy", &|machine| machine.platform.inertia.m12);
-    show("m2", &|machine| machine.rod.mass);
-    show("reflected", &|machine| machine.actuator.reflected_mass);
-    for leg in 0..6 {
-        show("viscous", &|machine| machine.actuator.viscous_friction[leg]);
-        show("Coulomb", &|machine| machine.actuator.coulomb_friction[leg]);
-        show("load", &|machine| machine.actuator.load_friction[leg]);
-        show("scale", &|machine| machine.actuator.force_scale[leg]);
+    check("mass", &|machine| machine.platform.mass);
+    check("mass with rods", &|machine| machine.platform.mass + 6.0 * machine.rod.mass);
+    for axis in 0..3 {
+        check("centre of mass", &|machine| machine.platform.center_of_mass[axis]);
+        check("moment of inertia", &|machine| machine.platform.inertia[(axis, axis)]);
     }
+    check("product of inertia", &|machine| machine.platform.inertia.m12);
+    check("rod", &|machine| machine.rod.mass);
+    check("reflected mass", &|machine| machine.actuator.reflected_mass);
+    for leg in 0..6 {
+        check("viscous friction", &|machine| machine.actuator.viscous_friction[leg]);
+        check("Coulomb friction", &|machine| machine.actuator.coulomb_friction[leg]);
+        check("load friction", &|machine| machine.actuator.load_friction[leg]);
+        check("force scale", &|machine| machine.actuator.force_scale[leg]);
+    }
+    worst
 }

@@ -1,4 +1,4 @@
-//! Linear equations of a recorded motion, one for each leg and sample:
+//! Linear equations of a recorded motion, one for each leg and group of samples, of which it has the means:
 //!
 //! ```text
 //! s_i u_i - s_i mu_i |u_i| sign(L'_i) = Y_i (p + payload) + Y_i known
@@ -14,7 +14,7 @@ use super::samples::MotionSample;
 use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::Machine;
-use crate::model::regressor::{PARAMETER_COUNT, regressor};
+use crate::model::regressor::{PARAMETER_COUNT, Regressor, regressor};
 
 /// Parameters of a rigid body: mass, first moments, inertia about C.
 pub(super) const BODY: usize = 10;
@@ -31,8 +31,8 @@ pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 /// leg's root mean square rate, if that is less.
 const STANDING_M_S: f64 = 0.03;
 const STANDING_RATIO: f64 = 0.2;
-/// Time before and after a sample in which its leg must not turn around \[s\].
-const TURNING_S: f64 = 0.04;
+/// Successive samples whose means form an equation: 80 ms at 1 kHz, in which noise averages out on both sides alike.
+const GROUP: usize = 16;
 
 /// Body on the platform in a recording, beside the platform itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,18 +77,30 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
     let standing = standing.map(|square| STANDING_M_S.min(STANDING_RATIO * square.sqrt()));
     let known = load.parameters();
     let mut found = vec![];
-    for (sample, motion) in samples.iter().zip(&legs) {
-        let Some(y) = regressor(machine, &sample.motion) else { continue };
-        let of_legs = motion.rate.iter().zip(&motion.accel).zip(&sample.command).zip(&standing);
-        for (leg, ((((rate, accel), command), standing), row)) in of_legs.zip(y.row_iter()).enumerate() {
-            if !(rate.abs() > standing + TURNING_S * accel.abs()) {
+    for (samples, legs) in samples.chunks_exact(GROUP).zip(legs.chunks_exact(GROUP)) {
+        if !is_gapless(samples) {
+            continue;
+        }
+        let Some(regressors) =
+            samples.iter().map(|sample| regressor(machine, &sample.motion)).collect::<Option<Vec<_>>>()
+        else {
+            continue;
+        };
+        let y = regressors.iter().sum::<Regressor>() / GROUP as f64;
+        for ((leg, row), standing) in y.row_iter().enumerate().zip(standing) {
+            let of_leg = |values: &[f64; LEGS]| values.get(leg).copied().unwrap_or_default();
+            let rates = || legs.iter().map(|motion| of_leg(&motion.rate));
+            let sign = rates().next().unwrap_or_default().signum();
+            if rates().any(|rate| !(rate * sign > standing)) {
                 continue;
             }
+            let commands = || samples.iter().map(|sample| of_leg(&sample.command));
+            let mean = |sum: f64| sum / GROUP as f64;
             let body = row.fixed_columns::<BODY>(0);
             let mut coefficients = Unknowns::zeros();
             coefficients.fixed_rows_mut::<PARAMETER_COUNT>(0).copy_from(&-row.transpose());
-            coefficients.fixed_rows_mut::<1>(SCALE + leg).fill(*command);
-            coefficients.fixed_rows_mut::<1>(LOSS + leg).fill(-command.abs() * rate.signum());
+            coefficients.fixed_rows_mut::<1>(SCALE + leg).fill(mean(commands().sum()));
+            coefficients.fixed_rows_mut::<1>(LOSS + leg).fill(-sign * mean(commands().map(f64::abs).sum()));
             if *load == Load::Payload {
                 coefficients.fixed_rows_mut::<BODY>(PAYLOAD).copy_from(&-body.transpose());
             }
@@ -96,6 +108,12 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
         }
     }
     found
+}
+
+/// Whether samples follow each other without a gap.
+fn is_gapless(samples: &[MotionSample]) -> bool {
+    let gaps = || samples.iter().zip(samples.iter().skip(1)).map(|(a, b)| b.time_s - a.time_s);
+    gaps().fold(0.0, f64::max) < 1.5 * gaps().fold(f64::INFINITY, f64::min)
 }
 
 /// What equations say about the unknowns x and the known side: `|A x - b|^2 = |R [x; -1]|^2`, R triangular.

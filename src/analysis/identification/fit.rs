@@ -17,8 +17,11 @@ use crate::model::LEGS;
 
 /// Turns of theta and sigma, steps of each, and the smallest change of the cost in deviations that counts.
 const TURNS: u32 = 4;
-const MAX_STEPS: u32 = 60;
+const MAX_STEPS: u32 = 200;
 const CONVERGED: f64 = 1e-10;
+/// Damping with which a step is nearly that of Gauss and Newton, and from which on no step is left.
+const SMALL_DAMPING: f64 = 0.1;
+const MAX_DAMPING: f64 = 1e12;
 /// Residual before the first fit, over the largest force.
 const FIRST_RESIDUAL_RATIO: f64 = 0.01;
 /// Step of the differences, over the deviation of a parameter.
@@ -142,7 +145,7 @@ impl Problem<'_> {
             let gradient = jacobian.tr_mul(&terms);
             let before = terms.norm_squared();
             let mut change = 0.0;
-            while damping < 1e12 {
+            while damping < MAX_DAMPING {
                 let mut damped = normal.clone();
                 damped.set_diagonal(&(normal.diagonal() * (1.0 + damping)));
                 let step = damped.cholesky()?.solve(&gradient);
@@ -157,7 +160,9 @@ impl Problem<'_> {
                 }
                 damping *= 10.0;
             }
-            if !(change > CONVERGED * before) {
+            // A damped step that changes little says nothing: the valley may be long.
+            let is_stuck = !(damping < MAX_DAMPING);
+            if is_stuck || !(change > CONVERGED * before) && damping < SMALL_DAMPING {
                 break;
             }
         }

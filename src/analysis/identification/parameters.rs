@@ -60,6 +60,8 @@ const PAYLOAD_PER_PLATFORM: f64 = 0.05;
 const PAYLOAD_MASS_LOG: f64 = 3.0;
 const PAYLOAD_SIZE_LOG: f64 = 1.5;
 const PAYLOAD_SIZE: f64 = 0.2;
+/// Logarithm of the ratio by which a body may be smaller than expected: twenty times.
+const LEAST_SIZE_LOG: f64 = 3.0;
 /// Second moment that a body has at least, as a share of its largest: a flat plate has none across.
 const LEAST_MOMENT: f64 = 1e-6;
 
@@ -135,9 +137,13 @@ impl Parameters {
         self.deviation.fixed_rows_mut::<LOG_PAYLOAD>(0).scale_mut(HELD);
     }
 
-    /// The nearest parameters with no negative friction.
+    /// The nearest parameters with no negative friction and no body of next to no size: the search would not leave it.
     pub fn within_bounds(&self, mut free: Free) -> Free {
         free.rows_mut(REFLECTED, LOG_SCALE - REFLECTED).apply(|value| *value = value.max(0.0));
+        for size in [1, LOG_PAYLOAD + 1].into_iter().flat_map(|first| first..first + 3) {
+            let least = self.prior.row(size).x - LEAST_SIZE_LOG;
+            free.row_mut(size).apply(|value| *value = value.max(least));
+        }
         free
     }
 
