@@ -28,6 +28,7 @@ mod examined;
 mod excite;
 mod fidelity;
 mod hosted;
+mod identify;
 mod in_force;
 mod killed;
 mod locked_memory;

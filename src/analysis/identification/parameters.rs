@@ -63,7 +63,7 @@ const PAYLOAD_SIZE: f64 = 0.2;
 /// Logarithm of the ratio by which a body may be smaller than expected: twenty times.
 const LEAST_SIZE_LOG: f64 = 3.0;
 /// Second moment that a body has at least, as a share of its largest: a flat plate has none across.
-const LEAST_MOMENT: f64 = 1e-6;
+const LEAST_MOMENT: f64 = 1e-5;
 
 /// Platform, links and drives of a machine, and a payload.
 #[derive(Clone, Debug)]

@@ -69,13 +69,17 @@ impl Estimate {
         self.rounded(old) == self.rounded(self.value)
     }
 
-    /// A number rounded to the fourth digit of the deviation. Estimates belong together: the mass of platform and rods is
-    /// known a hundred times better than either, so digits that one number alone does not justify count.
+    /// A number rounded to the fourth digit of the deviation, or with seven digits if that is more. Estimates belong
+    /// together: the mass of platform and rods is known a hundred times better than either, and the moments of a flat
+    /// plate add up. So digits that one number alone does not justify count.
     fn rounded(&self, x: f64) -> f64 {
         if !(self.deviation > 0.0 && self.deviation.is_finite()) {
             return rounded_to_digits(x, Self::DIGITS);
         }
-        let decimals = 3 - self.deviation.log10().floor() as i32;
+        let places = |of: f64, digits: i32| digits - 1 - of.log10().floor() as i32;
+        let by_deviation = places(self.deviation, 4);
+        let is_small = x.abs() <= self.deviation;
+        let decimals = if is_small { by_deviation } else { by_deviation.max(places(x.abs(), 7)) };
         match usize::try_from(decimals) {
             Ok(decimals) => format!("{x:.decimals$}").parse().unwrap_or(x),
             Err(_) => {

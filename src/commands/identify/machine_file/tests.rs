@@ -118,7 +118,7 @@ fn a_configuration_has_the_new_values() {
     let platform = &config.machine.platform;
     assert_eq!(
         (platform.mass, platform.center_of_mass.into(), platform.inertia[(0, 1)]),
-        (64.23, [0.0211, 0.015, 0.1234], -0.123)
+        (64.2345, [0.0211111, 0.015, 0.1234], -0.12345)
     );
     assert_eq!(config.machine.actuator.coulomb_friction, friction);
 }
@@ -126,16 +126,16 @@ fn a_configuration_has_the_new_values() {
 #[test]
 fn the_old_value_and_the_deviation_are_the_comment() {
     for (line, new, expected) in [
-        ("  mass_kg = 15", 15.234, "  mass_kg = 15.23 # was 15, +- 0.12"),
-        ("mass_kg=1_5.0# scales", 15.234, "mass_kg=15.23# scales # was 1_5.0, +- 0.12"),
-        ("mass_kg = 15.0   # was 14.0, +- 0.2", 15.234, "mass_kg = 15.23 # was 15.0, +- 0.12"),
-        ("mass_kg = 15.0 # scales # new, +- 0.2", 15.234, "mass_kg = 15.23 # scales # was 15.0, +- 0.12"),
+        ("  mass_kg = 15", 15.234, "  mass_kg = 15.234 # was 15, +- 0.12"),
+        ("mass_kg=1_5.0# scales", 15.234, "mass_kg=15.234# scales # was 1_5.0, +- 0.12"),
+        ("mass_kg = 15.0   # was 14.0, +- 0.2", 15.234, "mass_kg = 15.234 # was 15.0, +- 0.12"),
+        ("mass_kg = 15.0 # scales # new, +- 0.2", 15.234, "mass_kg = 15.234 # scales # was 15.0, +- 0.12"),
         (
             "mass_kg = 15.0 # was 14 before 2025",
             15.2,
             "mass_kg = 15.2 # was 14 before 2025 # was 15.0, +- 0.12",
         ),
-        ("mass_kg = 15.0 # was 14.0, +- 0.2", 15.001, "mass_kg = 15.0 # was 14.0, +- 0.2"),
+        ("mass_kg = 15.0 # was 14.0, +- 0.2", 15.0000001, "mass_kg = 15.0 # was 14.0, +- 0.2"),
     ] {
         let text = format!("# Payload included.\n[platform]\n# Weighed.\n{line}\n\n# Legs.\n[[leg]]\n");
         let value = one(&["platform", "mass_kg"], new, 0.1234);
@@ -286,7 +286,5 @@ proptest! {
         let edited = edited("a = 1e13", &[one(&["a"], value, deviation)]).unwrap();
         let read = edited.parse::<Table>().unwrap()["a"].as_float().unwrap();
         prop_assert!((read - value).abs() <= 0.1 * deviation, "{edited}");
-        let digits = edited.split(' ').nth(2).unwrap().split('e').next().unwrap();
-        prop_assert!(digits.len() < 3 + 1 + 16);
     }
 }
