@@ -2,7 +2,7 @@
 //!
 //! | step | file |
 //! | --- | --- |
-//! | motion and commands of a recording at the same instants, smoothed alike | [`samples`] |
+//! | motion and commands of a recording at the same instants, smoothed alike | [`mod@samples`] |
 //! | equations, linear in parameters and force scales, and their QR decomposition | `equations` |
 //! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
 //! | most probable parameters, their deviations | `fit` |

@@ -3,7 +3,7 @@
 //! Around an instant t a polynomial of fourth degree is fitted to the measured poses and to the commands, weighted by
 //! `(1 - ((t_k - t) / H)^2)^2`. Its value and derivatives at t are the sample. A command acts a delay after its release and
 //! is held until the next, so it belongs to the middle of that time. H is short, so that motions of 3 Hz pass to 1e-4; what noise
-//! that leaves, 35 mm/s^2 in the acceleration for 2 um at 1 kHz, averages out in [`super::equations`].
+//! that leaves, 35 mm/s^2 in the acceleration for 2 um at 1 kHz, averages out in the equations.
 //!
 //! Poses are displacements from the pose in the middle. Near zero the rotation vector's derivatives are angular velocity
 //! and acceleration.
