@@ -1,6 +1,6 @@
 //! Delay of the drives from a motion under control, which does not know it.
 
-use hexad::analysis::drive_delay::{DriveDelay, MeasuredMotion, RecordedStretch, SentForce, drive_delay};
+use hexad::analysis::drive_delay::{DriveDelay, RecordedStretch, drive_delay};
 use hexad::config::Config;
 use hexad::control::signals::state::State;
 use hexad::motion::built_in::{BuiltInMotion, fit};
@@ -9,7 +9,7 @@ use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfecti
 use rayon::prelude::*;
 
 use super::common::certificate::cases;
-use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
+use super::common::hardware_loop::{HardwareLoop, SENDING, configured, record};
 
 /// Duration of the motion \[s\].
 const MOTION_S: f64 = 20.0;
@@ -42,14 +42,7 @@ fn recorded(config: &Config, imperfections: &Imperfections, motion: BuiltInMotio
             assert_eq!(output.state, State::Active, "{:?}", output.diagnostic);
         }
         if output.state == State::Active {
-            let measurement = input.measurement.unwrap();
-            stretch.sent.push(SentForce { release_ns: input.release_ns, force: output.force });
-            stretch.measured.push(MeasuredMotion {
-                time_ns: measurement.time_ns,
-                length: measurement.length,
-                pose: output.platform.unwrap().pose,
-                reference: output.reference.unwrap(),
-            });
+            record(&mut stretch, &input, &output);
         }
     }
     stretch

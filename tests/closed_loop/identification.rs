@@ -1,7 +1,7 @@
 //! Identification from recordings of a closed loop on hardware that is not what its file says: masses, friction and force scale of
 //! each leg, stiction, load friction, noise, force steps.
 
-use hexad::analysis::drive_delay::{MeasuredMotion, RecordedStretch, SentForce, drive_delay};
+use hexad::analysis::drive_delay::{RecordedStretch, drive_delay};
 use hexad::analysis::identification::{Identification, Load, Run, identify, prediction_errors, samples};
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::common::certificate::Certificate;
-use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
+use super::common::hardware_loop::{HardwareLoop, SENDING, configured, record};
 use super::common::identified::{drawn, loaded};
 use super::common::largest;
 
@@ -51,14 +51,7 @@ fn played(config: &Config, platform: &Machine, motion: &Trajectory, seed: u64) -
             (squares, count) = (squares + error.norm_squared(), count + 1);
         }
         if output.state == State::Active {
-            let measurement = input.measurement.unwrap();
-            stretch.sent.push(SentForce { release_ns: input.release_ns, force: output.force });
-            stretch.measured.push(MeasuredMotion {
-                time_ns: measurement.time_ns,
-                length: measurement.length,
-                pose: output.platform.unwrap().pose,
-                reference: output.reference.unwrap(),
-            });
+            record(&mut stretch, &input, &output);
         }
     }
     (stretch, (squares / f64::from(count)).sqrt())

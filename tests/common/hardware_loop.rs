@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
+use hexad::analysis::drive_delay::{MeasuredMotion, RecordedStretch, SentForce};
 use hexad::config::Config;
 use hexad::control::controller::{Controller, Output};
 use hexad::control::signals::diagnostic::DiagnosticCode;
@@ -41,6 +42,18 @@ pub fn configured(machine: &str, lines: &str) -> Config {
         edited::config(&table)
     };
     remembered(&KNOWN, &format!("{machine} {lines}"), make)
+}
+
+/// Adds a cycle under control to a stretch.
+pub fn record(stretch: &mut RecordedStretch, input: &Input, output: &Output) {
+    let measurement = input.measurement.unwrap();
+    stretch.sent.push(SentForce { release_ns: input.release_ns, force: output.force });
+    stretch.measured.push(MeasuredMotion {
+        time_ns: measurement.time_ns,
+        length: measurement.length,
+        pose: output.platform.unwrap().pose,
+        reference: output.reference.unwrap(),
+    });
 }
 
 /// A controller and imperfect hardware.

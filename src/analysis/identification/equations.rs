@@ -51,7 +51,7 @@ pub enum Load {
 }
 
 impl Load {
-    /// Parameters of the body, as those of the platform in the regressor.
+    /// Parameters of the body, in the order of the platform's parameters in the regressor.
     fn parameters(&self) -> SVector<f64, BODY> {
         let Self::Known { mass, at: [x, y, z] } = *self else { return SVector::zeros() };
         SVector::from([1.0, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])

@@ -19,7 +19,7 @@ use crate::model::LEGS;
 const TURNS: u32 = 4;
 const MAX_STEPS: u32 = 200;
 const CONVERGED: f64 = 1e-10;
-/// Damping with which a step is nearly that of Gauss and Newton, and from which on no step is left.
+/// Damping with which a step is nearly a Gauss-Newton step, and damping at which the search ends.
 const SMALL_DAMPING: f64 = 0.1;
 const MAX_DAMPING: f64 = 1e12;
 /// Residual before the first fit, over the largest force.

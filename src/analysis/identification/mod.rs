@@ -7,7 +7,7 @@
 //! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
 //! | most probable parameters, their deviations | `fit` |
 //!
-//! Equations alone do not tell everything apart, see [`crate::model::regressor`]: what they leave open stays as the file
+//! Equations alone do not distinguish all parameters, see [`crate::model::regressor`]: what they leave open stays as the file
 //! has it. Without a known weight on the platform in one of the recordings no motion distinguishes the mean of the force
 //! scales from all masses and friction: then the mean stays as it is.
 

@@ -3,7 +3,7 @@
 //! | free parameter | stands for |
 //! | --- | --- |
 //! | 0-9 | platform: log-Cholesky parameters of its pseudo-inertia |
-//! | 10-12 | cylinder: logarithms of centre of mass, transverse and axial inertia, over those of the file |
+//! | 10-12 | cylinder: logarithms of centre of mass, transverse and axial inertia, relative to the file |
 //! | 13-16 | rod: the same, mass first |
 //! | 17 | reflected mass |
 //! | 18-23, 24-29, 30-35 | viscous and Coulomb friction, load friction, of each leg |
@@ -132,7 +132,7 @@ impl Parameters {
         Self { file: file.clone(), prior, deviation }
     }
 
-    /// Holds all parameters but those of the payload.
+    /// Holds all parameters except the payload's.
     pub fn hold_machine(&mut self) {
         self.deviation.fixed_rows_mut::<LOG_PAYLOAD>(0).scale_mut(HELD);
     }

@@ -19,7 +19,7 @@ const HALF_WIDTH_S: f64 = 0.02;
 const MIN_PERIODS: f64 = 8.0;
 /// Samples within H.
 const SAMPLES_PER_HALF_WIDTH: f64 = 4.0;
-/// Most samples of a stretch: those of a longer one are farther apart.
+/// Most samples of a stretch. In a longer stretch the samples are farther apart.
 const MAX_SAMPLES: f64 = 100_000.0;
 /// Least number of values for a polynomial, and least distance of the outermost from its centre, over H.
 const MIN_VALUES: usize = 10;

@@ -41,7 +41,7 @@ const PLATFORM: [(Path, Number); 7] = [
 ];
 const CENTER: Path = &["platform", "center_of_mass_m"];
 
-/// Transverse inertia of a link: its key, that of its constant part if it varies, and the link.
+/// Transverse inertia of a link: its key, the key of its constant part if it varies, and the link.
 type Across = (Path, Path, fn(&Machine) -> &Link);
 const ACROSS: [Across; 2] = [
     (

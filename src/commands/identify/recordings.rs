@@ -10,7 +10,7 @@ use crate::messages::CycleMessage;
 use crate::recording::Item;
 use crate::recording::reader::Recording;
 
-/// Stretches of recordings, and the configuration in force: that of the newest.
+/// Stretches of recordings, and the configuration of the newest recording.
 #[derive(Default)]
 pub(super) struct Recorded {
     /// Configuration and its text.

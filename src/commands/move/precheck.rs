@@ -64,7 +64,7 @@ impl<'a> Precheck<'a> {
         self
     }
 
-    /// Whether a setpoint keeps the limits at its instant, those of the pose included.
+    /// Whether a setpoint keeps the limits at its instant, including the limits of the pose.
     pub fn keeps_limits(&self, state: &TaskState) -> bool {
         let setpoint = SetpointMotion::new(Setpoint::motion(0, *state));
         let kinematic_state = KinematicState::new(self.machine, setpoint.motion.pose);

@@ -3,7 +3,7 @@
 use crate::commands::check::CheckReport;
 use crate::config::Config;
 
-/// The lines that differ, each with its number: `-` for lines of the old text, `+` for those of the new.
+/// The lines that differ, each with its number: `-` for lines of the old text, `+` for lines of the new text.
 pub fn difference(old: &str, new: &str) -> String {
     let [old, new] = [old, new].map(|text| text.lines().collect::<Vec<_>>());
     let (mut shown, mut i, mut j) = (String::new(), 0, 0);
