@@ -20,7 +20,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
-use super::force_integrals::{ForceIntegrals, differences};
+use super::force_integrals::{ForceIntegrals, SentForce, differences};
 use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
@@ -29,15 +29,6 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::regressor::regressor;
 use crate::model::rigid::{Acceleration, Motion, Pose};
-
-/// A force that is sent, and the release of its cycle.
-#[derive(Clone, Copy, Debug)]
-pub struct SentForce {
-    /// \[ns\]
-    pub release_ns: u64,
-    /// \[N\]
-    pub force: [f64; LEGS],
-}
 
 /// A measurement under control.
 #[derive(Clone, Copy, Debug)]

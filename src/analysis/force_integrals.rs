@@ -2,7 +2,16 @@
 
 use nalgebra::Vector6;
 
-use super::drive_delay::SentForce;
+use crate::model::LEGS;
+
+/// A force that is sent, and the release of its cycle.
+#[derive(Clone, Copy, Debug)]
+pub struct SentForce {
+    /// \[ns\]
+    pub release_ns: u64,
+    /// \[N\]
+    pub force: [f64; LEGS],
+}
 
 /// First and second derivative by divided differences: the first at the middle, the second as the mean over the triangle.
 pub(super) fn differences(

@@ -26,7 +26,7 @@ pub mod envelope;
 pub mod excitation_design;
 pub mod fidelity_choice;
 pub mod fidelity_error;
-mod force_integrals;
+pub mod force_integrals;
 pub mod held_forces;
 pub mod identification;
 mod known_delay;

@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use hexad::analysis::drive_delay::{MeasuredMotion, RecordedStretch, SentForce};
+use hexad::analysis::drive_delay::{MeasuredMotion, RecordedStretch};
+use hexad::analysis::force_integrals::SentForce;
 use hexad::config::Config;
 use hexad::control::controller::{Controller, Output};
 use hexad::control::signals::diagnostic::DiagnosticCode;

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::IdentifyError;
-use crate::analysis::drive_delay::{MeasuredMotion, RecordedStretch, SentForce};
+use crate::analysis::drive_delay::{MeasuredMotion, RecordedStretch};
+use crate::analysis::force_integrals::SentForce;
 use crate::commands::failure::Failure;
 use crate::config::Config;
 use crate::messages::CycleMessage;
