@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
 use hexad::analysis::excitation_design::{Sensitivities, base_parameters, base_values, design};
+use hexad::analysis::identification::expected_deviations;
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::model::active_forces::inverse_dynamics;
@@ -53,6 +54,19 @@ fn an_excitation_keeps_every_limit_of_the_machine() {
     }
 }
 
+/// Strokes from 0.1 mm to a metre, and drives of 1 mm/s.
+#[test]
+fn machines_of_every_size_are_excited() {
+    for name in ["mirror_unknown_friction", "piezo", "hobby", "telescope_m2", "plate_3m"] {
+        let config = Config::load(format!("tests/data/{name}.toml").as_ref()).unwrap();
+        let actuator = &config.machine.actuator;
+        let stroke = (actuator.max_length - actuator.min_length).min(actuator.max_rate * 1.0);
+        let reach = reach(&config, &excitation(&config, 1, 1.0));
+        println!("{name}: {reach:.1e} of a stroke, or of a second at the largest rate, {stroke:.1e} m");
+        assert!(reach > 0.02 * stroke, "{name}: {reach} m or rad");
+    }
+}
+
 #[test]
 fn counted_periods_repeat_and_derivatives_belong_to_the_motion() {
     let config = shipped("fried2008");
@@ -98,7 +112,7 @@ fn the_design_beats_random_motions() {
     }
 }
 
-/// By the inverse of the normal matrix of all instants at 100 Hz.
+/// By the inverse of the normal matrix of all instants at 100 Hz, and of what is known before.
 #[test]
 fn predicted_deviations_are_those_of_least_squares() {
     for name in MACHINES {
@@ -119,11 +133,20 @@ fn predicted_deviations_are_those_of_least_squares() {
             assert!((by_base - by_all).amax() < 1e-9 * by_all.amax(), "{name}");
             normal += columns.transpose() * columns;
         }
+        normal /= 9.0;
+        let before = expected_deviations(machine);
+        for (place, k) in base.iter().enumerate() {
+            normal[(place, place)] += before[*k].powi(-2);
+        }
         let covariance = normal.try_inverse().unwrap();
-        let deviations = Sensitivities::new(machine, &series).unwrap().deviations(3.0, 1000.0).unwrap();
+        let sensitivities = Sensitivities::new(machine, &series).unwrap();
+        let deviations = sensitivities.deviations(&before, 3.0, 1000.0).unwrap();
         for (place, (k, deviation)) in deviations.into_iter().enumerate() {
-            let expected = 3.0 * covariance[(place, place)].sqrt();
-            assert!((deviation / expected - 1.0).abs() < 0.05, "{name} {k}: {deviation} for {expected}");
+            let expected = covariance[(place, place)].sqrt();
+            assert!(
+                (deviation - expected).abs() <= 0.05 * expected,
+                "{name} {k}: {deviation} for {expected}"
+            );
         }
     }
 }

@@ -38,9 +38,11 @@ const GUIDES: usize = 4;
 const GUIDE_WEIGHT: f64 = 0.7;
 const DIFFERENCE_WEIGHT: f64 = 0.5;
 const CROSSOVER: f64 = 0.7;
-/// Largest growth of a series in one change, until it reaches a limit; bisections to a thousandth of that.
+/// Largest growth of a series in one change; halvings until it keeps the limits: a stroke may be a millionth of the radius of the
+/// joints; bisections to a thousandth from there.
 const MAX_GROWTH: f64 = 2.0;
-const AMPLITUDE_STEPS: u32 = 11;
+const MAX_HALVINGS: i32 = 30;
+const AMPLITUDE_STEPS: u32 = 10;
 
 /// Most iterations of a singular value decomposition: ten times the usual number.
 const MAX_SVD_STEPS: usize = 1000;
@@ -62,7 +64,7 @@ pub struct ExcitationDesign {
 }
 
 /// Series with a small condition, `amplitude` times as large as drives and `is_allowed` permit, also while it blends in
-/// and out. The same seed gives the same series. `None` if no random series determines the parameters.
+/// and out. The same seed gives the same series. `None` if they permit no motion.
 pub fn design(
     machine: &Machine,
     amplitude: f64,
@@ -75,8 +77,11 @@ pub fn design(
     };
     // The largest series of this shape, and the condition of the share of it that moves the platform.
     let rated = |shape: FourierSeries| {
-        let share =
-            edge_in_steps(AMPLITUDE_STEPS, 0.0, MAX_GROWTH, |share| keeps_limits(&shape.scaled(share)));
+        let keeps_limits = |share: f64| keeps_limits(&shape.scaled(share));
+        let share = (1..=MAX_HALVINGS)
+            .map(|halvings| MAX_GROWTH * 0.5_f64.powi(halvings))
+            .find(|share| keeps_limits(*share))?;
+        let share = edge_in_steps(AMPLITUDE_STEPS, share, 2.0 * share, keeps_limits);
         let largest = shape.scaled(share);
         Some((largest, Sensitivities::new(machine, &largest.scaled(amplitude))?.condition))
     };
@@ -170,7 +175,7 @@ pub struct Sensitivities {
 }
 
 impl Sensitivities {
-    /// Sensitivities along a series; `None` if it crosses a singular pose, or leaves a parameter without effect.
+    /// Sensitivities along a series; `None` if it crosses a singular pose.
     pub fn new(machine: &Machine, series: &FourierSeries) -> Option<Self> {
         let parameters = base_parameters(machine);
         let mut scaled = DMatrix::zeros(LEGS * INSTANTS as usize, parameters.len());
@@ -181,23 +186,33 @@ impl Sensitivities {
         }
         let norms =
             DVector::from_iterator(parameters.len(), scaled.column_iter().map(|column| column.norm()));
-        if !norms.iter().all(|norm| *norm > 0.0 && norm.is_finite()) {
-            return None;
-        }
-        scaled.column_iter_mut().zip(&norms).for_each(|(mut column, norm)| column /= *norm);
+        scaled
+            .column_iter_mut()
+            .zip(&norms)
+            .for_each(|(mut column, norm)| column /= norm.max(f64::MIN_POSITIVE));
         let singular =
             scaled.clone().try_svd_unordered(false, false, f64::EPSILON, MAX_SVD_STEPS)?.singular_values;
-        let condition = singular.max() / singular.min();
         // With a larger condition the inverse has no digits.
-        (condition * f64::EPSILON < 1.0).then_some(Self { condition, parameters, norms, scaled })
+        let condition = singular.max() / singular.min().max(f64::EPSILON * singular.max());
+        condition.is_finite().then_some(Self { condition, parameters, norms, scaled })
     }
 
-    /// Standard deviation of each base parameter by least squares of `count` instants whose forces have white noise of
-    /// the standard deviation `noise_n` \[N\], as pairs with the index of the parameter: `noise sqrt(diag (Y^T Y)^-1)`.
-    pub fn deviations(&self, noise_n: f64, count: f64) -> Option<Vec<(usize, f64)>> {
-        let inverse = self.scaled.clone().qr().unpack_r().try_inverse()?;
+    /// Standard deviation of each base parameter after `count` instants whose forces have white noise of the standard
+    /// deviation `noise_n` \[N\], as pairs with the index of the parameter: `sqrt diag (Y^T Y / noise^2 + D^-2)^-1`, D: the
+    /// deviations before.
+    pub fn deviations(
+        &self,
+        before: &InertialParameters,
+        noise_n: f64,
+        count: f64,
+    ) -> Option<Vec<(usize, f64)>> {
         let noise = noise_n * (f64::from(INSTANTS) / count).sqrt();
-        let deviations = inverse.row_iter().zip(&self.norms).map(|(row, norm)| noise * row.norm() / norm);
+        let before = before.select_rows(&self.parameters);
+        let weight = DMatrix::from_diagonal(&(self.norms.component_mul(&before) / noise));
+        let mut rows = (&self.scaled * weight).resize_vertically(self.scaled.nrows() + before.len(), 0.0);
+        rows.rows_mut(self.scaled.nrows(), before.len()).fill_with_identity();
+        let inverse = rows.qr().unpack_r().try_inverse()?;
+        let deviations = inverse.row_iter().zip(&before).map(|(row, before)| row.norm() * before);
         Some(self.parameters.iter().copied().zip(deviations).collect())
     }
 }

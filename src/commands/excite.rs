@@ -12,6 +12,7 @@ use super::failure::Failure;
 use super::r#move::PlaybackOptions;
 use super::r#move::trajectory::Trajectory;
 use crate::analysis::excitation_design::{Sensitivities, base_values};
+use crate::analysis::identification::expected_deviations;
 use crate::config::Config;
 use crate::model::regressor::{COULOMB, REFLECTED, VISCOUS};
 use crate::model::{LEGS, machine::Machine};
@@ -88,7 +89,8 @@ fn summary(config: &Config, excitation: &Excitation) -> String {
     let noise_n = NOISE_RATIO * machine.actuator.max_force;
     let count = f64::from(excitation.periods()) * PERIOD_S * NOISE_RATE_HZ;
     let sensitivities = Sensitivities::new(machine, excitation.series());
-    let deviations = sensitivities.as_ref().and_then(|all| all.deviations(noise_n, count));
+    let deviations =
+        sensitivities.as_ref().and_then(|all| all.deviations(&expected_deviations(machine), noise_n, count));
     let (Some(sensitivities), Some(deviations)) = (sensitivities, deviations) else {
         return "the motion does not show the parameters\n".into();
     };

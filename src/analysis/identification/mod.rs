@@ -16,8 +16,10 @@ use nalgebra::DVector;
 use self::equations::{Equation, equations};
 use self::fit::{Fit, fit};
 use self::parameters::{Bodies, FREE, Free, Parameters};
+use crate::analysis::excitation_design::base_values;
 use crate::model::LEGS;
 use crate::model::machine::{Machine, Platform};
+use crate::model::regressor::InertialParameters;
 
 mod equations;
 mod fit;
@@ -93,6 +95,20 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
         parameters,
         fit,
     })
+}
+
+/// How far a machine may be from its file before anything is recorded: standard deviations of its base parameters, see
+/// [`base_values`].
+pub fn expected_deviations(file: &Machine) -> InertialParameters {
+    let parameters = Parameters::new(file);
+    let at = |free: &Free| base_values(&parameters.bodies(free).machine);
+    let mut squares = InertialParameters::zeros();
+    for (index, deviation) in parameters.deviation.iter().enumerate() {
+        let step = Free::from_fn(|row, _| if row == index { DIFFERENCE * deviation } else { 0.0 });
+        let change = at(&(parameters.prior + step)) - at(&(parameters.prior - step));
+        squares += (change / (2.0 * DIFFERENCE)).map(|change| change * change);
+    }
+    squares.map(f64::sqrt)
 }
 
 impl Identification {
