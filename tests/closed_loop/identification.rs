@@ -156,3 +156,30 @@ fn certificate_machines_are_identified() {
     assert!(outside as u64 <= 1.max(3 * certificate.total() / 100), "{outside}");
     certificate.finish(format_args!("{outside} runs beyond three of their own deviations"));
 }
+
+/// A payload by 10 s of gentle motion of a machine that is identified: little shows how high its centre is.
+#[test]
+fn a_gentle_motion_shows_a_payload() {
+    let config = configured("motion_base", "[limits]\npayload_change_kg = inf\n");
+    let machine = &config.machine;
+    let gentle = Trajectory::Excitation(Box::new(Trajectory::excitation(&config, 1, 0.05, 1).unwrap()));
+    let platform = loaded(machine, PAYLOAD.0, Vector3::from(PAYLOAD.1));
+    let runs: Vec<_> = (1..=4)
+        .into_par_iter()
+        .map(|seed| Run {
+            samples: samples(&played(&config, &platform, &gentle, seed).0, SENDING / 1000.0),
+            load: Load::Payload,
+        })
+        .collect();
+    for run in runs {
+        let found = identify(machine, &[run], true).unwrap();
+        let mass = found.estimate(|_, payload| payload.mass);
+        let place: [_; 3] =
+            core::array::from_fn(|axis| found.estimate(|_, payload| payload.center_of_mass[axis]));
+        let off: [f64; 3] = core::array::from_fn(|axis| place[axis].value - PAYLOAD.1[axis]);
+        println!("mass {mass:?}, off {off:.5?}, deviations {:.5?}", place.map(|each| each.deviation));
+        assert!((mass.value / PAYLOAD.0 - 1.0).abs() < 5e-3, "{mass:?}");
+        assert!(off[0].abs().max(off[1].abs()) < 5e-3 && off[2].abs() < 0.1, "{off:?}");
+        assert!(off.iter().zip(&place).all(|(off, each)| off.abs() < 4.0 * each.deviation), "{off:?}");
+    }
+}

@@ -145,7 +145,7 @@ fn a_first_motion_leads_to_an_identified_file() {
         fs::write(&machine.file, format!("{text}\n[realtime]\nrelease = \"lockstep\"\n")).unwrap();
         let platform = machine.path("truth.toml");
         fs::write(&platform, format!("{text}\n{plant}\n[realtime]\nrelease = \"lockstep\"\n")).unwrap();
-        let motions = ["minimum-jerk", "sines", "circle"]
+        let motions = ["minimum-jerk", "circle"]
             .map(|motion| format!("hexad move --config F --motion {motion} --engage"));
         let motions = motions.each_ref().map(String::as_str);
         session(&machine, &platform, "hexad run --config F --record first", &motions[..1]);
