@@ -20,7 +20,7 @@ const PERIODS: &str = "2";
 const WEIGHT: &str = "[plant.build]\npayload_kg = 0.5\npayload_position_m = [0.0, 0.0, 0.1]\n";
 
 /// What the platform has in place of these lines of its file.
-const TRUTH: [(&str, &str); 2] = [
+const TRUTH: [(&str, &str); 4] = [
     ("mass_kg = 3.0", "mass_kg = 2.5"),
     ("center_of_mass_m = [0.0, 0.0, 0.0]", "center_of_mass_m = [0.01, 0.02, -0.015]"),
     (
@@ -84,7 +84,8 @@ fn check_example(json: &Value) {
         let found = find(row[0]);
         let [file, truth, value, deviation]: [f64; 4] = core::array::from_fn(|k| row[k + 1].parse().unwrap());
         let known = number(&found, "deviation");
-        assert_eq!(number(&found, "file"), file, "{row:?} {found}");
+        // A flat plate gets a little thickness.
+        assert!((number(&found, "file") - file).abs() <= 1e-4 * file, "{row:?} {found}");
         assert!((number(&found, "value") - truth).abs() < 5.0 * known, "{row:?} {found}");
         assert!((number(&found, "value") - value).abs() < 6.0 * known, "{row:?} {found}");
         assert!((deviation / known - 1.0).abs() < 0.5, "{row:?} {found}");
@@ -125,7 +126,7 @@ fn a_new_machine_is_identified_as_the_guide_says() {
         lines.for_each(|line| assert!(in_guide(line.trim()), "the guide must show: {line}"));
         truth = truth.replacen(stated, true_value, 1);
     }
-    let [platform, with_weight] = ["truth.toml", "with_weight.toml"].map(|name| machine.path(name));
+    let [platform, with_weight] = ["TRUE.toml", "WEIGHT.toml"].map(|name| machine.path(name));
     fs::write(&platform, &truth).unwrap();
     fs::write(&with_weight, format!("{truth}\n{WEIGHT}")).unwrap();
     let excite = "hexad excite --config F --engage";
@@ -154,7 +155,7 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     );
 
     let [found, truth] =
-        [machine.path("NEW.toml"), platform].map(|path| Config::load(&path).unwrap().machine);
+        [machine.path("NEW.toml"), platform.clone()].map(|path| Config::load(&path).unwrap().machine);
     let mass = |machine: &hexad::model::machine::Machine| machine.platform.mass + 6.0 * machine.rod.mass;
     assert!((mass(&found) / mass(&truth) - 1.0).abs() < 2e-3, "{}", mass(&found));
     for leg in 0..6 {
