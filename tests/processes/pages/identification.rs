@@ -96,6 +96,7 @@ fn check_residuals(json: &Value, text: &str, shown: &Value) {
             assert!(is_equal, "leg {}: {drawn} N drawn, {stated} N stated", leg + 1);
         }
     }
+    assert!(shown["difference"].as_f64().unwrap() < 1e-4, "curves of forces and residuals differ: {shown}");
     for row in rows(&shown["residuals"]) {
         let (correlation, cells) = row.split_last().unwrap();
         assert!(lines(text).iter().any(|line| line == cells), "{cells:?} must be in the text:\n{text}");
