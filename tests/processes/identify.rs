@@ -1,9 +1,11 @@
-//! The steps of `docs/identification.md`, as a user types them, in lock-step with a platform that is not what its file says.
+//! The steps and the example of `docs/identification.md`, as a user types them, in lock-step with a platform that is not what its
+//! file says.
 
 use std::fs;
 use std::path::Path;
 
 use hexad::config::Config;
+use serde_json::Value;
 
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::Machine;
@@ -18,8 +20,13 @@ const PERIODS: &str = "2";
 const WEIGHT: &str = "[plant.build]\npayload_kg = 0.5\npayload_position_m = [0.0, 0.0, 0.1]\n";
 
 /// What the platform has in place of these lines of its file.
-const TRUTH: [(&str, &str); 2] = [
+const TRUTH: [(&str, &str); 4] = [
     ("mass_kg = 3.0", "mass_kg = 2.5"),
+    ("center_of_mass_m = [0.0, 0.0, 0.0]", "center_of_mass_m = [0.01, 0.02, -0.015]"),
+    (
+        "inertia_kg_m2 = { xx = 0.375, yy = 0.1875, zz = 0.1875 }",
+        "inertia_kg_m2 = { xx = 0.32, yy = 0.16, zz = 0.16 }",
+    ),
     (
         "max_force_n = 500.0",
         "max_force_n = 500.0\nviscous_friction_n_s_m = [11, 9, 12, 10, 8, 13]\ncoulomb_friction_n = 1.5\n\
@@ -27,9 +34,9 @@ const TRUTH: [(&str, &str); 2] = [
     ),
 ];
 
-/// A command that the guide shows.
+/// A line that the guide shows.
 fn shown(line: &str) -> &str {
-    assert!(GUIDE.contains(&format!("\n   {line}\n")), "the guide must show: {line}");
+    assert!(GUIDE.lines().any(|shown| shown.trim() == line), "the guide must show: {line}");
     line
 }
 
@@ -46,6 +53,50 @@ fn typed(machine: &Machine, line: &str) -> std::process::Command {
         };
     }
     command
+}
+
+/// The table of the example must be what was identified: the file's value exactly, the true value within five deviations. Two
+/// identifications differ by their noise.
+fn check_example(json: &Value) {
+    let number = |row: &Value, key: &str| row[key].as_f64().unwrap();
+    let names = ["viscous friction [N s/m]", "Coulomb friction [N]", "load friction", "force scale"];
+    let find = |label: &str| match label.strip_prefix("leg ").and_then(|rest| rest.split_once(": ")) {
+        Some((leg, name)) => {
+            let quantity = names.iter().position(|known| *known == name).unwrap();
+            json["legs"][leg.parse::<usize>().unwrap() - 1][quantity].clone()
+        }
+        None => {
+            let mut rows = json["quantities"].as_array().unwrap().iter();
+            let is_it = |row: &&Value| {
+                label == format!("{} [{}]", row["name"].as_str().unwrap(), row["unit"].as_str().unwrap())
+            };
+            rows.find(is_it).expect(label).clone()
+        }
+    };
+    let (_, example) = GUIDE.split_once("| identified | deviation |").unwrap();
+    let rows: Vec<Vec<_>> = example
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'))
+        .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
+        .collect();
+    assert!(rows.len() > 12, "{rows:?}");
+    for row in rows {
+        let found = find(row[0]);
+        let [file, truth, value, deviation]: [f64; 4] = core::array::from_fn(|k| row[k + 1].parse().unwrap());
+        let known = number(&found, "deviation");
+        // A flat plate gets a little thickness.
+        assert!((number(&found, "file") - file).abs() <= 1e-4 * file, "{row:?} {found}");
+        assert!((number(&found, "value") - truth).abs() < 5.0 * known, "{row:?} {found}");
+        assert!((number(&found, "value") - value).abs() < 6.0 * known, "{row:?} {found}");
+        assert!((deviation / known - 1.0).abs() < 0.5, "{row:?} {found}");
+    }
+}
+
+/// RMS tracking error of the daemon's report \[m\].
+fn tracking_error(machine: &Machine, report: &str) -> f64 {
+    let report: Value = serde_json::from_slice(&fs::read(machine.path(report)).unwrap()).unwrap();
+    report["tracking"]["position_rms_m"].as_f64().unwrap()
 }
 
 /// Daemon and platform while a setpoint source plays its motion.
@@ -74,9 +125,11 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     let mut truth = fs::read_to_string(&machine.file).unwrap();
     for (stated, true_value) in TRUTH {
         assert!(truth.contains(stated), "{stated}");
+        let lines = true_value.lines().filter(|line| !stated.contains(line));
+        lines.for_each(|line| _ = shown(line.trim()));
         truth = truth.replacen(stated, true_value, 1);
     }
-    let [platform, with_weight] = ["truth.toml", "with_weight.toml"].map(|name| machine.path(name));
+    let [platform, with_weight] = ["TRUE.toml", "WEIGHT.toml"].map(|name| machine.path(name));
     fs::write(&platform, &truth).unwrap();
     fs::write(&with_weight, format!("{truth}\n{WEIGHT}")).unwrap();
     let excite = shown("hexad excite --config F --engage");
@@ -85,14 +138,18 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     let circle = shown("hexad move --config F --motion circle --engage");
     session(&machine, &platform, shown("hexad run --config F --record other"), &[circle]);
     let line = shown(
-        "hexad identify empty/*.mcap --loaded loaded/*.mcap --known-mass 0.5 --at 0,0,0.1 --validate other/*.mcap --output NEW.toml",
+        "hexad identify empty/*.mcap --loaded loaded/*.mcap --known-mass 0.5 --at 0,0,0.1 --validate other/*.mcap --output NEW.toml --page NEW.html",
     );
     let before = fs::read(&machine.file).unwrap();
     let ended = Hexad::spawn(&machine, "identify", typed(&machine, line)).ends_within(HANG);
     println!("{}", ended.stdout);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    for words in ["platform with six rods", "delay of the drives, from release to force", "NEW.toml: written"]
-    {
+    for words in [
+        "platform with six rods",
+        "delay of the drives, from release to force",
+        "NEW.toml: written",
+        "page with charts: NEW.html",
+    ] {
         assert!(ended.stdout.contains(words), "{words}");
     }
     assert_eq!(fs::read(&machine.file).unwrap(), before, "the file in force stays");
@@ -103,7 +160,7 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     );
 
     let [found, truth] =
-        [machine.path("NEW.toml"), platform].map(|path| Config::load(&path).unwrap().machine);
+        [machine.path("NEW.toml"), platform.clone()].map(|path| Config::load(&path).unwrap().machine);
     let mass = |machine: &hexad::model::machine::Machine| machine.platform.mass + 6.0 * machine.rod.mass;
     assert!((mass(&found) / mass(&truth) - 1.0).abs() < 2e-3, "{}", mass(&found));
     for leg in 0..6 {
@@ -114,13 +171,24 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     }
 
     // A file that exists is kept, with one clear error.
-    let again = Hexad::spawn(&machine, "again", typed(&machine, line)).ends_within(HANG);
+    let mut again = typed(&machine, line);
+    again.arg("--json");
+    let again = Hexad::spawn(&machine, "again", again).ends_within(HANG);
     assert_eq!(again.status.code(), Some(2), "{}", again.stderr);
     assert!(
         again.stderr.contains("NEW.toml exists already; name another file with --output"),
         "{}",
         again.stderr
     );
+    check_example(&serde_json::from_str(&again.stdout).unwrap());
+
+    // The new file tracks.
+    session(&machine, &platform, shown("hexad run --config F --report before.json"), &[circle]);
+    let circle = shown("hexad move --config NEW.toml --motion circle --engage");
+    session(&machine, &platform, shown("hexad run --config NEW.toml --report after.json"), &[circle]);
+    let [before, after] = ["before.json", "after.json"].map(|report| tracking_error(&machine, report));
+    println!("tracks with {before:e} m RMS with the file, {after:e} m with the identified one");
+    assert!(after < 0.1 * before, "{after} {before}");
 }
 
 /// Machines whose drives differ from their files: the mirror has dry friction, the motion base friction, dead time and lag. Last:

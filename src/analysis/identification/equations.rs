@@ -32,7 +32,7 @@ pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 const STANDING_M_S: f64 = 0.03;
 const STANDING_RATIO: f64 = 0.2;
 /// Successive samples whose means form an equation: 80 ms at 1 kHz, in which noise averages out on both sides alike.
-const GROUP: usize = 16;
+pub(super) const GROUP: usize = 16;
 
 /// Body on the platform in a recording, beside the platform itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,8 @@ impl Load {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equation {
     pub leg: usize,
+    /// First instant of the group, since the first release of the stretch \[s\].
+    pub time_s: f64,
     pub coefficients: Unknowns,
     pub right: f64,
 }
@@ -87,6 +89,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
             continue;
         };
         let y = regressors.iter().sum::<Regressor>() / GROUP as f64;
+        let time_s = samples.first().map_or(0.0, |sample| sample.time_s);
         for ((leg, row), standing) in y.row_iter().enumerate().zip(standing) {
             let of_leg = |values: &[f64; LEGS]| values.get(leg).copied().unwrap_or_default();
             let rates = || legs.iter().map(|motion| of_leg(&motion.rate));
@@ -104,7 +107,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
             if *load == Load::Payload {
                 coefficients.fixed_rows_mut::<BODY>(PAYLOAD).copy_from(&-body.transpose());
             }
-            found.push(Equation { leg, coefficients, right: (body * known).x });
+            found.push(Equation { leg, time_s, coefficients, right: (body * known).x });
         }
     }
     found

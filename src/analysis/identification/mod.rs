@@ -13,7 +13,7 @@
 
 use nalgebra::DVector;
 
-use self::equations::{Equation, equations};
+use self::equations::{Equation, GROUP, SCALE, equations};
 use self::fit::{Fit, fit};
 use self::parameters::{Bodies, FREE, Free, Parameters};
 use crate::analysis::excitation_design::base_values;
@@ -144,18 +144,48 @@ impl Run {
     pub fn duration_s(&self) -> f64 {
         self.samples.first().zip(self.samples.last()).map_or(0.0, |(first, last)| last.time_s - first.time_s)
     }
+
+    /// Time of which a prediction is the mean \[s\].
+    pub fn group_s(&self) -> f64 {
+        let steps = self.samples.iter().zip(self.samples.iter().skip(1)).map(|(a, b)| b.time_s - a.time_s);
+        GROUP as f64 * steps.fold(f64::INFINITY, f64::min)
+    }
 }
 
-/// RMS and largest part of the commands of each leg \[N\] in runs that a machine does not explain.
-pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
-    let unknowns = Parameters::new(machine).unknowns(&Parameters::new(machine).prior);
-    let mut errors = [(0.0, 0.0_f64, 0_u32); LEGS];
-    for equation in runs.iter().flat_map(|run| equations(machine, &run.samples, &run.load)) {
+/// Command of a leg in a run, mean of a group of samples, and what a machine does not explain of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Prediction {
+    /// Leg.
+    pub leg: usize,
+    /// First instant of the group, since the first release of the stretch \[s\].
+    pub time_s: f64,
+    /// Recorded command \[N\].
+    pub command: f64,
+    /// Command less that of the machine \[N\].
+    pub residual: f64,
+}
+
+/// Predictions of the commands of a run. A leg that nearly stands has none.
+pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
+    let parameters = Parameters::new(machine);
+    let unknowns = parameters.unknowns(&parameters.prior);
+    let prediction = |equation: Equation| {
+        let command = equation.coefficients.row(SCALE + equation.leg).x;
         let residual = fit::residual(&equation, &unknowns);
-        if let Some((squares, largest, count)) = errors.get_mut(equation.leg) {
+        Prediction { leg: equation.leg, time_s: equation.time_s, command, residual }
+    };
+    equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
+}
+
+/// RMS and largest part of the commands of each leg \[N\] in runs that a machine does not explain; NaN for a leg that nearly
+/// stands.
+pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
+    let mut errors = [(0.0, f64::NAN, 0_u32); LEGS];
+    for Prediction { leg, residual, .. } in runs.iter().flat_map(|run| predictions(machine, run)) {
+        if let Some((squares, largest, count)) = errors.get_mut(leg) {
             (*squares, *largest, *count) =
                 (*squares + residual * residual, largest.max(residual.abs()), *count + 1);
         }
     }
-    errors.map(|(squares, largest, count)| [(squares / f64::from(count.max(1))).sqrt(), largest])
+    errors.map(|(squares, largest, count)| [(squares / f64::from(count)).sqrt(), largest])
 }

@@ -7,16 +7,17 @@ use clap::Args;
 use self::machine_file::{MachineFileError, changed_margins, difference, edited, write_new};
 use self::new_values::new_values;
 use self::recordings::Recorded;
-use self::report::{Delay, IdentificationReport};
+use self::report::{Delay, IdentificationReport, predicted};
 use super::failure::{CommandError, Failure};
 use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
 use crate::analysis::identification::{Load, Run, identify, samples};
 use crate::config::Config;
 use crate::model::machine::Machine;
-use crate::output::files::{print, print_json};
+use crate::output::files::{print, print_json, write_whole};
 
 mod machine_file;
 mod new_values;
+mod page;
 mod quantities;
 mod recordings;
 mod report;
@@ -49,6 +50,9 @@ pub struct IdentifyArguments {
     /// New machine file with the result; a payload is then a part of the platform
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Page with charts: change of each parameter, forces and residuals with the file and with the result (HTML)
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -105,6 +109,13 @@ impl IdentifyArguments {
         match self.json {
             true => print_json(&report)?,
             false => print(&report)?,
+        }
+        if let Some(path) = &self.page {
+            let machines = [machine, &found.machine];
+            write_whole(path, page::text(&report, machines, &predicted(&runs, &validation)).as_bytes())?;
+            if !self.json {
+                print(format_args!("\npage with charts: {}\n", path.display()))?;
+            }
         }
         let Some(path) = &self.output else { return Ok(()) };
         let new = edited(&text, &new_values(&found, !self.payload.is_empty(), &delay))?;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::quantities::{BODIES, LEG_QUANTITIES, PAYLOAD, Quantity};
 use crate::analysis::drive_delay::DriveDelay;
 use crate::analysis::identification::{Estimated, Identification, Load, Run, prediction_errors};
+use crate::commands::report::summary::Fact;
 use crate::config::Config;
 use crate::model::LEGS;
 use crate::model::machine::{Machine, Platform};
@@ -15,6 +16,10 @@ use crate::output::text_table::{Left, MAX_WIDTH, Right, paragraph, text_table};
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
+
+/// Columns of [`LEG_QUANTITIES`] in the text.
+const LEG_COLUMNS: [&str; 4] =
+    ["viscous friction [N s/m]", "Coulomb friction [N]", "load friction", "force scale"];
 
 /// Largest share of the deviation that was expected before which a quantity may have that the motion shows.
 const SHOWN_RATIO: f64 = 0.5;
@@ -46,7 +51,7 @@ pub(super) struct IdentificationReport {
     is_scale_known: bool,
     quantities: Vec<Row>,
     legs: [Vec<Row>; LEGS],
-    /// RMS and largest force that is not explained, with the file and with the result.
+    /// RMS and largest force that is not explained, with the file and with the result; NaN for a leg that nearly stands.
     before: [[f64; 2]; LEGS],
     after: [[f64; 2]; LEGS],
     /// Whether these are of a motion that the identification did not use.
@@ -61,28 +66,46 @@ pub(super) struct IdentificationReport {
     delay: Delay,
 }
 
+/// Runs whose forces are predicted: those of the other motion, or the identified ones. The payload is not a part of the machine.
+pub(super) fn predicted(runs: &[Run], validation: &[Run]) -> Vec<Run> {
+    let predicted = if validation.is_empty() { runs } else { validation };
+    predicted.iter().filter(|run| run.load != Load::Payload).cloned().collect()
+}
+
 /// A quantity.
 #[derive(Clone, Debug, Serialize)]
-struct Row {
+pub(super) struct Row {
     name: &'static str,
     unit: &'static str,
     value: f64,
     deviation: f64,
     file: f64,
+    /// Deviation that was expected of the file.
+    expected: f64,
     /// Whether the motion shows it, or it is as far as it was known before.
-    is_shown: bool,
+    pub is_shown: bool,
 }
 
 impl Row {
     fn new(name: &'static str, unit: &'static str, estimated: &Estimated) -> Self {
         let Estimated { value, deviation, before, expected } = *estimated;
-        Self { name, unit, value, deviation, file: before, is_shown: deviation < SHOWN_RATIO * expected }
+        let is_shown = deviation < SHOWN_RATIO * expected;
+        Self { name, unit, value, deviation, file: before, expected, is_shown }
     }
 
-    fn cells(&self) -> [String; 5] {
+    /// Change from the file, and its deviation, both over the deviation that was expected of the file.
+    pub fn change(&self) -> [f64; 2] {
+        [self.value - self.file, self.deviation].map(|number| number / self.expected)
+    }
+
+    fn label(&self) -> String {
+        format!("{} [{}]", self.name, self.unit)
+    }
+
+    /// Values of file and result, deviation, and what shows it.
+    pub fn cells(&self) -> [String; 4] {
         let shown = if self.is_shown { "the motion" } else { "the file" };
         [
-            format!("{} [{}]", self.name, self.unit),
             significant(self.file),
             with_deviation(self.value, self.deviation),
             format!("+- {}", two_digits(self.deviation)),
@@ -116,8 +139,7 @@ impl IdentificationReport {
             };
             LEG_QUANTITIES.iter().map(|(name, unit, of)| Row::new(name, unit, &of_leg(*of))).collect()
         };
-        let predicted = if validation.is_empty() { runs } else { validation };
-        let predicted: Vec<_> = predicted.iter().filter(|run| run.load != Load::Payload).cloned().collect();
+        let predicted = predicted(runs, validation);
         Self {
             schema: SCHEMA,
             machine: config.name.clone(),
@@ -142,38 +164,91 @@ impl IdentificationReport {
 
 impl fmt::Display for IdentificationReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { machine, duration_s, equations, shown, unknown, .. } = self;
-        writeln!(f, "{machine}: {duration_s:.0} s of motion under control, {equations} equations")?;
-        let all = shown + unknown;
-        let words = format!(
-            "The motion shows {shown} of {all} combinations of the parameters; the others stay as the file has them."
-        );
-        write!(f, "{}", paragraph("", &words, MAX_WIDTH))?;
-        if !self.is_scale_known {
-            let words = "No recording has a known weight (--loaded): the mean of the force scales stays as it is, and masses and \
-                         friction are times the true mean.";
+        writeln!(f, "{}: {}", self.machine, self.extent_text())?;
+        for words in [self.shown_text()].iter().map(String::as_str).chain(self.scale_text()) {
             write!(f, "{}", paragraph("", words, MAX_WIDTH))?;
         }
         let header =
             [("parameter", Left), ("file", Right), ("identified", Right), ("", Left), ("shown by", Left)];
-        writeln!(f, "\n{}", text_table(2, &header, self.quantities.iter().map(Row::cells)))?;
+        let rows = self.quantities.iter().map(|row| [vec![row.label()], row.cells().into()].concat());
+        writeln!(f, "\n{}", text_table(2, &header, rows))?;
         if !self.legs.iter().all(Vec::is_empty) {
             self.fmt_legs(f)?;
         }
-        self.fmt_prediction(f)?;
-        self.fmt_delay(f)
+        // Of a payload alone no run is predicted.
+        if self.before.iter().flatten().any(|force| force.is_finite()) {
+            self.fmt_prediction(f)?;
+        }
+        writeln!(f, "{}{}", self.delay_text(), self.delay_lines())
     }
 }
 
 impl IdentificationReport {
+    /// Facts for the head of a page.
+    pub fn facts(&self) -> Vec<Fact> {
+        let fact = |name, text| Fact { name, text, is_bad: false };
+        let scales = self.scale_text().map(|text| fact("Force scales", text.into()));
+        let delay = fact("Delay", self.delay_text());
+        let mut facts =
+            vec![fact("Recordings", self.extent_text()), fact("Parameters", self.shown_text()), delay];
+        facts.extend(scales);
+        facts
+    }
+
+    /// Name of the machine.
+    pub fn machine(&self) -> &str {
+        &self.machine
+    }
+
+    /// Name of each quantity with its row, in the order of the text.
+    pub fn rows(&self) -> impl Iterator<Item = (String, &Row)> {
+        let of_legs = LEG_COLUMNS.iter().enumerate().flat_map(|(quantity, name)| {
+            let rows = self.legs.iter().zip(1..);
+            rows.filter_map(move |(rows, leg)| Some((format!("leg {leg}: {name}"), rows.get(quantity)?)))
+        });
+        self.quantities.iter().map(|row| (row.label(), row)).chain(of_legs)
+    }
+
+    /// Motion whose forces are predicted.
+    pub fn predicted_motion(&self) -> &'static str {
+        if self.is_validated { "of the other motion" } else { "of these motions" }
+    }
+
+    /// Number of each leg, RMS and largest force that is not explained, with the file and with the result.
+    pub fn residual_cells(&self) -> Vec<[String; 5]> {
+        let cells = |(leg, (before, after)): (usize, (&[f64; 2], &[f64; 2]))| {
+            let text = |force: f64| if force.is_nan() { "stands".into() } else { significant(force) };
+            let [a, b, c, d] = [before[0], before[1], after[0], after[1]].map(text);
+            [format!("{}", leg + 1), a, b, c, d]
+        };
+        self.before.iter().zip(&self.after).enumerate().map(cells).collect()
+    }
+
+    /// Correlation of successive residuals of each leg.
+    pub fn correlation(&self) -> &[f64; LEGS] {
+        &self.correlation
+    }
+
+    fn extent_text(&self) -> String {
+        format!("{:.0} s of motion under control, {} equations", self.duration_s, self.equations)
+    }
+
+    fn shown_text(&self) -> String {
+        let (shown, all) = (self.shown, self.shown + self.unknown);
+        format!(
+            "The motion shows {shown} of {all} combinations of the parameters; the others stay as the file has them."
+        )
+    }
+
+    fn scale_text(&self) -> Option<&'static str> {
+        let text = "No recording has a known weight (--loaded): the mean of the force scales stays as it is, and masses and friction \
+                    are times the true mean.";
+        (!self.is_scale_known).then_some(text)
+    }
+
     fn fmt_legs(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let header = [
-            ("leg", Right),
-            ("viscous friction [N s/m]", Right),
-            ("Coulomb friction [N]", Right),
-            ("load friction", Right),
-            ("force scale", Right),
-        ];
+        let header: Vec<_> =
+            core::iter::once("leg").chain(LEG_COLUMNS).map(|column| (column, Right)).collect();
         let cells = |(index, leg): (usize, &Vec<Row>)| {
             let number = |row: &Row| {
                 format!("{} +- {}", with_deviation(row.value, row.deviation), two_digits(row.deviation))
@@ -184,34 +259,31 @@ impl IdentificationReport {
     }
 
     fn fmt_prediction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let of = if self.is_validated { "of the other motion" } else { "of these motions" };
-        writeln!(f, "force [N] {of} that is not explained, RMS and largest:\n")?;
+        writeln!(f, "force [N] {} that is not explained, RMS and largest:\n", self.predicted_motion())?;
         let header = [("leg", Right), ("file", Right), ("", Right), ("identified", Right), ("", Right)];
-        let rows = self.before.iter().zip(&self.after).enumerate().map(|(leg, (before, after))| {
-            let [a, b, c, d] = [before[0], before[1], after[0], after[1]].map(significant);
-            [format!("{}", leg + 1), a, b, c, d]
-        });
-        writeln!(f, "{}", text_table(2, &header, rows))
+        writeln!(f, "{}", text_table(2, &header, self.residual_cells()))
     }
 
-    fn fmt_delay(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Delay { used_s, shown, lag_s, file_s } = &self.delay;
-        let Some(DriveDelay { mean, .. }) = shown else {
-            return writeln!(
-                f,
-                "delay of the drives: not shown by this motion; {:.2} ms was used ([drive] delay_us, lag_us)",
-                1e3 * used_s
+    fn delay_text(&self) -> String {
+        let Some(DriveDelay { mean, .. }) = self.delay.shown else {
+            let used_ms = 1e3 * self.delay.used_s;
+            return format!(
+                "delay of the drives: not shown by this motion; {used_ms:.2} ms was used ([drive] delay_us, lag_us)"
             );
+        };
+        let [delay_ms, deviation_ms] = [mean.delay_s, mean.deviation_s].map(|seconds| 1e3 * seconds);
+        format!("delay of the drives, from release to force: {delay_ms:.3} ms +- {deviation_ms:.3} ms")
+    }
+
+    /// Lines of the machine file, if the motion shows the delay.
+    fn delay_lines(&self) -> String {
+        let Delay { shown: Some(DriveDelay { mean, .. }), lag_s, file_s, .. } = &self.delay else {
+            return String::new();
         };
         let was = file_s.map_or("was not given".into(), |delay_s| format!("was {:.0}", 1e6 * delay_s));
         let lag = if *lag_s > 0.0 { ", less lag_us" } else { "" };
-        writeln!(
-            f,
-            "delay of the drives, from release to force: {:.3} ms +- {:.3} ms\n\n[drive]\ndelay_us = {:.0}   # {was}{lag}",
-            1e3 * mean.delay_s,
-            1e3 * mean.deviation_s,
-            (1e6 * (mean.delay_s - lag_s)).max(0.0)
-        )
+        let delay_us = (1e6 * (mean.delay_s - lag_s)).max(0.0);
+        format!("\n\n[drive]\ndelay_us = {delay_us:.0}   # {was}{lag}")
     }
 }
 

@@ -55,10 +55,13 @@ impl<'a> Events<'a> {
 
 /// Head of a level: instants \[s\], and where its samples begin.
 #[derive(Serialize)]
-struct LevelHead {
-    from: f64,
-    step: f64,
-    samples: u64,
+pub struct LevelHead {
+    /// First instant.
+    pub from: f64,
+    /// Distance of the samples.
+    pub step: f64,
+    /// Number of samples.
+    pub samples: u64,
 }
 
 /// The machine as the page draws it.

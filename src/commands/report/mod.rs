@@ -10,7 +10,7 @@ use self::run::Run;
 use super::failure::{CommandError, Failure};
 use crate::config::{Config, ConfigError};
 use crate::output::files::{FileError, print, write_whole};
-use crate::output::page::page;
+use crate::output::page::{PageKind, page};
 use crate::recording::RecordingError;
 
 pub mod deadlines;
@@ -68,7 +68,7 @@ pub fn write(recordings: &[PathBuf], output: &Path) -> Result<String, ReportErro
     let samples: Vec<u8> = levels.iter().flat_map(Level::bytes).collect();
     let head = head::of_recording(&run, &extents, &kept);
     let title = format!("{}: recording", run.info().name);
-    let text = page(&title, &head, &samples, false);
+    let text = page(PageKind::Recording, &title, &head, &samples);
     write_whole(output, text.as_bytes())?;
     let megabytes = text.len() as f64 * 1e-6;
     Ok(format!("{} cycles, {megabytes:.1} MB; {kept}", run.history.cycles))

@@ -19,7 +19,7 @@ use crate::config::Config;
 use crate::operator::endpoint::{Endpoint, endpoints};
 use crate::operator::users::user_name;
 use crate::output::files::print;
-use crate::output::page::page;
+use crate::output::page::{PageKind, page};
 use crate::realtime::stop_request::Stop;
 
 mod live;
@@ -106,7 +106,7 @@ fn reply(config: &Config, live: &Mutex<Live>, path: &str, query: &[(&str, &str)]
             let title = format!("{}: live", config.name);
             Some(Reply {
                 kind: "text/html; charset=utf-8",
-                content: page(&title, &head::of_live(config), &[], true),
+                content: page(PageKind::Live, &title, &head::of_live(config), &[]),
             })
         }
         "/data" => {

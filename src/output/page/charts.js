@@ -46,17 +46,19 @@ function tickText(number) {
   return String(Number(number.toFixed(6))).replace("-", "−");
 }
 
+// Style of a line on top of others.
+const DASHED = { width: 1, dash: [4, 4], stroke: () => color("ink"), alpha: 0.8 };
+
 // Series of a panel: first what was measured or applied, then the references on top of them.
 function seriesOf(panel) {
   const first = HEAD.columns[panel.signal];
   const measured = panel.names.map((name, k) => ({
     column: first + k, color: k + (panel.color || 0), label: name, width: 2, stroke: () => color(`c${k + (panel.color || 0)}`),
+    ...(k === panel.dashed ? DASHED : {}),
   }));
   if (!panel.reference) return measured;
   const reference = HEAD.columns[panel.reference];
-  return measured.concat(panel.names.map((name, k) => ({
-    column: reference + k, label: `${name}, reference`, width: 1, dash: [4, 4], stroke: () => color("ink"), alpha: 0.8,
-  })));
+  return measured.concat(panel.names.map((name, k) => ({ column: reference + k, label: `${name}, reference`, ...DASHED })));
 }
 
 // Legend with the values at the cursor; its buttons hide a component.
@@ -69,7 +71,7 @@ function legendOf(panel, series, toggle) {
   }
   table.append(head);
   const rows = panel.names.map((name, k) => {
-    const swatch = element("span", { className: "swatch" });
+    const swatch = element("span", { className: k === panel.dashed ? "swatch dashed" : "swatch" });
     swatch.style.color = `var(--c${k + (panel.color || 0)})`;
     const button = element("button", { type: "button", title: `Show or hide ${name}` }, swatch, name);
     button.setAttribute("aria-pressed", "true");
@@ -82,9 +84,8 @@ function legendOf(panel, series, toggle) {
     table.append(element("tr", {}, element("td", {}, button), ...cells));
     return cells;
   });
-  const least = { "[m]": HEAD.machine.digits, "[deg]": HEAD.machine.digits - 1 }[panel.label.split(" ").pop()];
   const show = (sample) => rows.forEach((cells, k) => cells.forEach((cell, which) => {
-    cell.textContent = rounded(sample(series[k + which * panel.names.length].column), least);
+    cell.textContent = rounded(sample(series[k + which * panel.names.length].column), panel.digits);
   }));
   return { table, show };
 }

@@ -6,7 +6,6 @@ const KEPT_S = 120;
 // Range of time that is shown as long as the user has not chosen one [s].
 const FOLLOWED_S = 20;
 
-let isFollowed = HEAD.is_live;
 // Number of the run, which changes with the daemon.
 let run = 0;
 

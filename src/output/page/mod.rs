@@ -15,29 +15,65 @@ const FRAME: &str = include_str!("page.html");
 const LICENSE: &str = include_str!("uplot/LICENSE");
 const STYLES: [&str; 2] = [include_str!("uplot/uPlot.min.css"), include_str!("page.css")];
 
-/// Scripts in the order in which they run.
-const SCRIPTS: [&str; 8] = [
-    include_str!("uplot/uPlot.iife.min.js"),
-    include_str!("data.js"),
-    include_str!("figures.js"),
-    include_str!("charts.js"),
-    include_str!("tracks.js"),
-    include_str!("scene.js"),
-    include_str!("live.js"),
-    include_str!("page.js"),
-];
+/// Scripts of all pages in the order in which they run.
+const LIBRARY: &str = include_str!("uplot/uPlot.iife.min.js");
+const DATA: &str = include_str!("data.js");
+const CHARTS: &str = include_str!("charts.js");
+const PAGE: &str = include_str!("page.js");
 
-/// Assembles a page. `head` is JSON, `samples` are the bytes of numbers; `is_live` if a server feeds it.
-pub fn page(title: &str, head: &str, samples: &[u8], is_live: bool) -> String {
+/// Kind of a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PageKind {
+    /// A recorded run.
+    Recording,
+    /// A run that a server feeds.
+    Live,
+    /// An identification.
+    Identification,
+}
+
+impl PageKind {
+    fn policy(self) -> &'static str {
+        if self == Self::Live { LIVE_POLICY } else { POLICY }
+    }
+
+    fn body(self) -> &'static str {
+        match self {
+            Self::Recording | Self::Live => include_str!("run.html"),
+            Self::Identification => include_str!("identification.html"),
+        }
+    }
+
+    fn scripts(self) -> &'static [&'static str] {
+        match self {
+            Self::Recording | Self::Live => &[
+                LIBRARY,
+                DATA,
+                include_str!("figures.js"),
+                CHARTS,
+                include_str!("tracks.js"),
+                include_str!("scene.js"),
+                include_str!("live.js"),
+                PAGE,
+                include_str!("run.js"),
+            ],
+            Self::Identification => &[LIBRARY, DATA, CHARTS, PAGE, include_str!("identification.js")],
+        }
+    }
+}
+
+/// Assembles a page. `head` is JSON, `samples` are the bytes of numbers.
+pub fn page(kind: PageKind, title: &str, head: &str, samples: &[u8]) -> String {
     let mut text = String::with_capacity(samples.len() / 3 * 4 + head.len() + 500_000);
     for part in FRAME.split("{{") {
         let (name, rest) = part.split_once("}}").unwrap_or(("", part));
         match name {
             "title" => text.push_str(&title.replace('&', "&amp;").replace('<', "&lt;")),
-            "policy" => text.push_str(if is_live { LIVE_POLICY } else { POLICY }),
+            "policy" => text.push_str(kind.policy()),
             "license" => text.push_str(LICENSE),
+            "body" => text.push_str(kind.body()),
             "styles" => STYLES.iter().for_each(|style| text.push_str(style)),
-            "scripts" => SCRIPTS.iter().for_each(|script| text.push_str(script)),
+            "scripts" => kind.scripts().iter().for_each(|script| text.push_str(script)),
             // So that nothing in it ends the element.
             "head" => text.push_str(&head.replace('<', "\\u003c")),
             "samples" => append_base64(&mut text, samples),
@@ -89,16 +125,16 @@ mod tests {
     #[test]
     fn a_page_is_one_document_that_no_text_can_leave() {
         let head = "{\"text\":\"</script><script>alert(1)\"}";
-        let text = page("a < b & c", head, b"foo", false);
-        assert!(text.contains("<title>a &lt; b &amp; c</title>") && text.contains(">Zm9v</script>"));
-        assert!(!text.contains("alert(1)</script>") && !text.contains("</script><script>alert"));
-        assert!(
-            text.contains("connect-src").eq(&false) && page("", "", b"", true).contains("connect-src 'self'")
-        );
-        assert!(!text.contains("{{") || text.matches("{{").count() == SCRIPTS.join("").matches("{{").count());
-        for address in ["src=\"http", "href=\"http", "url(http", "@import"] {
-            assert!(!text.contains(address), "{address}");
+        for kind in [PageKind::Recording, PageKind::Live, PageKind::Identification] {
+            let text = page(kind, "a < b & c", head, b"foo");
+            assert!(text.contains("<title>a &lt; b &amp; c</title>") && text.contains(">Zm9v</script>"));
+            assert!(!text.contains("alert(1)</script>") && !text.contains("</script><script>alert"));
+            assert_eq!(text.contains("connect-src 'self'"), kind == PageKind::Live);
+            assert_eq!(text.matches("{{").count(), kind.scripts().concat().matches("{{").count());
+            for address in ["src=\"http", "href=\"http", "url(http", "@import"] {
+                assert!(!text.contains(address), "{address}");
+            }
+            assert!(text.contains("Permission is hereby granted"));
         }
-        assert!(text.contains("Permission is hereby granted"));
     }
 }

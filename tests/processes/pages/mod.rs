@@ -1,5 +1,6 @@
-//! Pages with charts in a browser: of a recording, and live.
+//! Pages with charts in a browser: of a recording, of an identification, and live.
 
 mod browser;
+mod identification;
 mod report;
 mod view;
