@@ -1,8 +1,12 @@
 //! Bodies in MuJoCo whose parameters a seed draws, in the plant's place: the daemon records how it moves them, and
 //! `hexad identify` finds from that what the machine file lacks.
 //!
-//! The machine file is up to 30 % off in masses, first moments, inertias and reflected mass, and states no friction. Each drive has
+//! The machine file is up to 30 % off in masses, centres of mass, inertias and reflected mass, and in force scales by 5 %. Each drive has
 //! viscous and Coulomb friction, a Stribeck part, load friction and a force scale. Lengths and rates are as the engine has them.
+//!
+//! MuJoCo integrates as the exported model says: implicit steps of 0.1 ms, ten in a period. Its forces then differ from inverse
+//! dynamics by 6e-5 RMS (`in_the_loop`), less than a tenth of the bound of 1e-3. In semi-implicit steps a force acts half a step earlier: the
+//! identification finds that as a delay of the drives of -0.05 ms.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -21,9 +25,9 @@ use toml::Table;
 use super::common::certificate::Certificate;
 use super::common::edited::{deployed_table, set, table};
 use super::common::identified::{drawn, loaded};
-use super::common::largest;
 use super::common::process::Process;
 use super::common::python::output;
+use super::common::{Errors, largest};
 use super::stage::{Run, Stage, turn};
 use super::{file, python};
 
@@ -46,7 +50,8 @@ struct Trial {
     truth: PathBuf,
     with_weight: PathBuf,
     friction: PathBuf,
-    label: String,
+    /// Folder of all this.
+    folder: PathBuf,
 }
 
 /// A machine whose links differ, too.
@@ -97,29 +102,33 @@ fn written(table: &Table, machine: &Machine) -> Table {
 
 impl Trial {
     fn new(seed: u64) -> Self {
-        let label = format!("identified-{}-{seed}", process::id());
+        let name = format!("identified-{}-{seed}", process::id());
+        let folder = file(&name);
+        // Of a failed process that had the same ID.
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
         let mut table = deployed_table(MACHINE);
-        table.insert("name".into(), label.clone().into());
+        table.insert("name".into(), name.into());
         set(&mut table, "realtime", "release", "lockstep");
         set(&mut table, "limits", "payload_change_kg", f64::INFINITY);
-        let file = Config::parse(&table.to_string(), "the machine file").unwrap().machine;
+        let machine = Config::parse(&table.to_string(), "the machine file").unwrap().machine;
         let mut random = Random::new(seed);
-        let truth = drawn_with_links(&file, &mut random);
-        let with_weight = loaded(&truth, WEIGHT_RATIO * file.platform.mass, Vector3::from(WEIGHT_AT));
-        let [truth_file, with_weight_file] =
-            [("truth", &truth), ("with_weight", &with_weight)].map(|(name, machine)| {
-                let path = super::file(&format!("{label}-{name}.toml"));
+        let truth = drawn_with_links(&machine, &mut random);
+        let with_weight = loaded(&truth, WEIGHT_RATIO * machine.platform.mass, Vector3::from(WEIGHT_AT));
+        let [truth_file, with_weight_file] = [("truth.toml", &truth), ("with_weight.toml", &with_weight)]
+            .map(|(name, machine)| {
+                let path = folder.join(name);
                 fs::write(&path, written(&table, machine).to_string()).unwrap();
                 path
             });
-        let friction = super::file(&format!("{label}-friction.csv"));
+        let friction = folder.join("friction.csv");
         let mut rows = String::from("load_friction,stribeck_n,stribeck_speed_m_s\n");
         for (load, coulomb) in truth.actuator.load_friction.iter().zip(truth.actuator.coulomb_friction) {
             let [excess, speed] = [0.3, 0.008].map(|mean| mean * (1.0 + 0.25 * random.signed()));
             writeln!(rows, "{load},{},{speed}", excess * coulomb).unwrap();
         }
         fs::write(&friction, rows).unwrap();
-        Self { file, table, truth: truth_file, with_weight: with_weight_file, friction, label }
+        Self { file: machine, table, truth: truth_file, with_weight: with_weight_file, friction, folder }
     }
 
     /// A run of a daemon with this machine file on a body, recorded.
@@ -130,7 +139,7 @@ impl Trial {
         body: &Path,
         source: impl FnOnce(&Stage) -> Process,
     ) -> Stage {
-        let stage = Stage::of(&format!("{}-{what}", self.label), machine_file);
+        let stage = Stage::of(self.folder.join(what), machine_file);
         let recording = stage.path("recording");
         let friction = ["--friction".as_ref(), self.friction.as_os_str()];
         stage.with_mujoco(body, &friction, &["--record".as_ref(), recording.as_os_str()], || source(&stage));
@@ -181,8 +190,9 @@ impl Trial {
         let ours = numbers(ours.map(|each| (each["name"].as_str().unwrap().into(), each["value"].clone())));
         assert!(theirs.keys().eq(ours.keys()) && found["equations"] == report["equations"]);
         assert_eq!(found["rank"], ours.len());
-        let differences = theirs.values().zip(ours.values()).map(|(a, b)| (a - b) / b).collect::<Vec<_>>();
-        let worst = largest(&differences);
+        let mut differences = Errors::default();
+        theirs.values().zip(ours.values()).for_each(|(a, b)| differences.add((a - b) / b));
+        let worst = differences.max;
         println!(
             "{} base parameters, condition {}: off by at most {worst:.1e} in numpy",
             ours.len(),
@@ -233,7 +243,7 @@ fn certificate_bodies_in_mujoco_are_identified() {
         let empty = body.excited("empty", &body.truth);
         let with_weight = body.excited("loaded", &body.with_weight);
         let (unused, by_file) = body.unused("file", &body.table.to_string());
-        let new = file(&format!("{}-new.toml", body.label));
+        let new = body.folder.join("new.toml");
         let report = body.identify(&empty, &with_weight, &unused, &new);
         body.numpy_agrees(&report, &empty, &with_weight);
 
@@ -257,6 +267,8 @@ fn certificate_bodies_in_mujoco_are_identified() {
         );
         worst_prediction = worst_prediction.max(after / peak);
         worst_tracking = worst_tracking.max(by_identified / by_exact);
+        // Hundreds of megabytes of a long form.
+        fs::remove_dir_all(&body.folder).unwrap();
         certificate.advance(1);
     }
     certificate.finish(format_args!(

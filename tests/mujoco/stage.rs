@@ -18,7 +18,8 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
-use super::common::process::Process;
+use super::common::certificate::Certificate;
+use super::common::process::{HANG, Process};
 use super::common::python::output;
 use super::{file, python};
 use crate::common::{Errors, Table, largest};
@@ -73,14 +74,11 @@ impl Stage {
             fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("config/{machine}.toml")));
         let named = text.unwrap().replace(&format!("name = \"{machine}\""), &format!("name = \"{name}\""));
         assert!(named.contains(&name), "the name must have been replaced");
-        Self::of(&name, &format!("{named}\n{sections}"))
+        Self::of(file(&name), &format!("{named}\n{sections}"))
     }
 
-    /// A folder of this name with a configuration.
-    pub fn of(folder: &str, configuration: &str) -> Self {
-        let folder = file(folder);
-        // Nothing of an earlier process with the same ID.
-        let _ = fs::remove_dir_all(&folder);
+    /// A run in this folder, with a configuration.
+    pub fn of(folder: PathBuf, configuration: &str) -> Self {
         fs::create_dir_all(&folder).unwrap();
         fs::write(folder.join("machine.toml"), configuration).unwrap();
         let config = Config::load(&folder.join("machine.toml")).unwrap();
@@ -143,7 +141,8 @@ impl Stage {
         let daemon = self.daemon(daemon);
         let arguments = [model.as_ref(), "--record".as_ref(), measured.as_ref()];
         let plant = self.client("mujoco_plant.py", &[&arguments, plant].concat());
-        source().ends_well();
+        // The motions of long forms take minutes.
+        source().ends_well_within(if Certificate::is_long() { 10 * HANG } else { HANG });
         // It stands, and is let go.
         daemon.says("standby: setpoint source ended");
         plant.stops();
