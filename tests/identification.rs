@@ -78,4 +78,5 @@ fn without_a_known_weight_masses_are_relative() {
     let mass = |machine: &Machine| machine.platform.mass + 6.0 * machine.rod.mass;
     assert!((mass(&found.machine) * 1.1 / mass(&truth) - 1.0).abs() < 1e-3, "{}", mass(&found.machine));
     assert!(found.machine.actuator.force_scale.iter().all(|scale| (scale - 1.0).abs() < 1e-3));
+    assert!(found.base_parameters.is_none(), "the equations alone allow zero");
 }

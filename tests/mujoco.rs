@@ -8,9 +8,11 @@ mod common;
 mod mujoco {
     use super::*;
 
+    mod identification;
     mod in_the_loop;
     mod layouts;
     pub mod python;
+    mod stage;
 }
 
 use std::ffi::OsStr;

@@ -44,12 +44,17 @@ impl Process {
     }
 
     /// Waits for its end, without failure.
-    pub fn ends_well(mut self) {
+    pub fn ends_well(self) {
+        self.ends_well_within(HANG);
+    }
+
+    /// The same for what may take longer.
+    pub fn ends_well_within(mut self, longest: Duration) {
         let began = Instant::now();
         loop {
             match self.child.try_wait().unwrap() {
                 Some(status) => return assert!(status.success(), "{status}:\n{}", self.words()),
-                None => assert!(began.elapsed() < HANG, "it does not end:\n{}", self.words()),
+                None => assert!(began.elapsed() < longest, "it does not end:\n{}", self.words()),
             }
             sleep(Duration::from_millis(2));
         }

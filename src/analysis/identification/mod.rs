@@ -6,6 +6,7 @@
 //! | equations, linear in parameters and force scales, and their QR decomposition | `equations` |
 //! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
 //! | most probable parameters, their deviations | `fit` |
+//! | base parameters by the equations alone | `least_squares` |
 //!
 //! Equations alone do not distinguish all parameters, see [`crate::model::regressor`]: what they leave open stays as the file
 //! has it. Without a known weight on the platform in one of the recordings no motion distinguishes the mean of the force
@@ -15,6 +16,7 @@ use nalgebra::DVector;
 
 use self::equations::{Equation, GROUP, SCALE, equations};
 use self::fit::{Fit, fit};
+use self::least_squares::least_squares;
 use self::parameters::{Bodies, FREE, Free, Parameters};
 use crate::analysis::excitation_design::base_values;
 use crate::model::LEGS;
@@ -23,6 +25,7 @@ use crate::model::regressor::InertialParameters;
 
 mod equations;
 mod fit;
+mod least_squares;
 mod parameters;
 pub mod samples;
 
@@ -55,6 +58,10 @@ pub struct Identification {
     pub residual: [f64; LEGS],
     /// Correlation of successive residuals of each leg: 0 for white noise.
     pub correlation: [f64; LEGS],
+    /// Base parameters by least squares of the equations alone, without prior: pairs of an index and a value. Indices are those of
+    /// the [regressor](crate::model::regressor), then six force scales, six products of force scale and load friction, and the
+    /// parameters of the payload. `None` without a known weight, or if the equations do not determine them.
+    pub base_parameters: Option<Vec<(usize, f64)>>,
     parameters: Parameters,
     fit: Fit,
 }
@@ -80,7 +87,8 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
         parameters.hold_machine();
     }
     let all: Vec<Equation> = runs.iter().flat_map(|run| equations(file, &run.samples, &run.load)).collect();
-    let is_scale_known = holds_machine || runs.iter().any(|run| matches!(run.load, Load::Known { .. }));
+    let has_known_weight = runs.iter().any(|run| matches!(run.load, Load::Known { .. }));
+    let is_scale_known = holds_machine || has_known_weight;
     let fit = fit(&parameters, &all, file.actuator.max_force, is_scale_known)?;
     let Bodies { machine, payload } = parameters.bodies(&fit.free);
     let Fit { shown, unknown, residual, correlation, .. } = fit;
@@ -92,6 +100,7 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
         unknown,
         residual,
         correlation,
+        base_parameters: least_squares(file, &all).filter(|_| has_known_weight),
         parameters,
         fit,
     })

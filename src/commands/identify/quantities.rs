@@ -3,6 +3,7 @@
 
 use crate::model::LEGS;
 use crate::model::machine::{Machine, Platform};
+use crate::model::regressor::VISCOUS;
 
 /// A number of machine and payload.
 pub(super) struct Quantity {
@@ -49,6 +50,46 @@ pub(super) const PAYLOAD: [Quantity; 4] = [
     quantity("payload: centre of mass y", "m", |_, payload| payload.center_of_mass.y),
     quantity("payload: centre of mass z", "m", |_, payload| payload.center_of_mass.z),
 ];
+
+/// Names of the base parameters up to the reflected mass, by their index in the regressor.
+const BASE_PARAMETERS: [&str; VISCOUS] = [
+    "mass",
+    "moment_x",
+    "moment_y",
+    "moment_z",
+    "inertia_xx",
+    "inertia_yy",
+    "inertia_zz",
+    "inertia_xy",
+    "inertia_xz",
+    "inertia_yz",
+    "cylinder_moment",
+    "transverse_inertia",
+    "axial_inertia",
+    "quadratic_inertia",
+    "rod_mass",
+    "rod_moment",
+    "rod_transverse_inertia",
+    "rod_axial_inertia",
+    "rod_quadratic_inertia",
+    "reflected_mass",
+];
+/// Of each leg.
+const LEG_PARAMETERS: [&str; 4] =
+    ["viscous_friction", "coulomb_friction", "force_scale", "scaled_load_friction"];
+
+/// Name of a base parameter.
+pub(super) fn base_parameter(index: usize) -> String {
+    let of_leg = |offset: usize| {
+        let name = LEG_PARAMETERS.get(offset / LEGS).map(|name| format!("{name}_{}", offset % LEGS + 1));
+        let payload = || {
+            BASE_PARAMETERS.get(offset - LEG_PARAMETERS.len() * LEGS).map(|name| format!("payload_{name}"))
+        };
+        name.or_else(payload)
+    };
+    let name = BASE_PARAMETERS.get(index).map(|name| (*name).to_owned());
+    name.or_else(|| of_leg(index - VISCOUS)).unwrap_or_default()
+}
 
 /// A number of each leg: key of the machine file, unit, values.
 pub(super) type LegQuantity = (&'static str, &'static str, fn(&Machine) -> &[f64; LEGS]);

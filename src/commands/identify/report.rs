@@ -4,7 +4,7 @@ use core::fmt;
 
 use serde::Serialize;
 
-use super::quantities::{BODIES, LEG_QUANTITIES, PAYLOAD, Quantity};
+use super::quantities::{BODIES, LEG_QUANTITIES, PAYLOAD, Quantity, base_parameter};
 use crate::analysis::drive_delay::DriveDelay;
 use crate::analysis::identification::{Estimated, Identification, Load, Run, prediction_errors};
 use crate::commands::report::summary::Fact;
@@ -58,6 +58,8 @@ pub(super) struct IdentificationReport {
     is_validated: bool,
     /// Correlation of successive residuals.
     correlation: [f64; LEGS],
+    /// Least squares of the equations alone, before any prior.
+    base_parameters: Option<Vec<BaseParameter>>,
     /// Delay that the motion shows.
     delay_us: Option<f64>,
     deviation_us: Option<f64>,
@@ -70,6 +72,13 @@ pub(super) struct IdentificationReport {
 pub(super) fn predicted(runs: &[Run], validation: &[Run]) -> Vec<Run> {
     let predicted = if validation.is_empty() { runs } else { validation };
     predicted.iter().filter(|run| run.load != Load::Payload).cloned().collect()
+}
+
+/// Combination of parameters that has an effect of its own.
+#[derive(Clone, Debug, Serialize)]
+struct BaseParameter {
+    name: String,
+    value: f64,
 }
 
 /// A quantity.
@@ -154,6 +163,11 @@ impl IdentificationReport {
             after: prediction_errors(&found.machine, &predicted),
             is_validated: !validation.is_empty(),
             correlation: found.correlation,
+            base_parameters: found.base_parameters.as_ref().map(|all| {
+                all.iter()
+                    .map(|(k, value)| BaseParameter { name: base_parameter(*k), value: *value })
+                    .collect()
+            }),
             delay_us: delay.shown.map(|found| 1e6 * found.mean.delay_s),
             deviation_us: delay.shown.map(|found| 1e6 * found.mean.deviation_s),
             leg_delay_us: delay.shown.map(|found| found.legs.map(|leg| 1e6 * leg.delay_s)),
