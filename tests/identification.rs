@@ -8,7 +8,7 @@ use hexad::model::fidelity::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::random::Random;
 use hexad::model::transmission::Transmission;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::common::identified::{Series, drawn, loaded, worst_error};
 use crate::common::machine;
@@ -79,4 +79,24 @@ fn without_a_known_weight_masses_are_relative() {
     assert!((mass(&found.machine) * 1.1 / mass(&truth) - 1.0).abs() < 1e-3, "{}", mass(&found.machine));
     assert!(found.machine.actuator.force_scale.iter().all(|scale| (scale - 1.0).abs() < 1e-3));
     assert!(found.base_parameters.is_none(), "the equations alone allow zero");
+}
+
+/// The file has a flat plate, the real platform is thick: the motion shows it, and the rods do not take its mass.
+#[test]
+fn a_flat_plate_may_be_thick() {
+    let mut random = Random::new(11);
+    let file = machine("fried2008");
+    let mut truth = file.clone();
+    truth.platform.mass = 2.5;
+    truth.platform.center_of_mass = Vector3::new(0.01, 0.02, -0.015);
+    truth.platform.inertia = Matrix3::from_diagonal(&Vector3::new(0.32, 0.17, 0.2));
+    let series = Series::new(&file, 1.0, &mut random);
+    let (mass, at) = (0.5, [0.0, 0.0, 0.1]);
+    let with_weight = loaded(&truth, mass, Vector3::from(at));
+    let runs = [
+        run(&truth, &series, 30.0, 0.1, Load::Empty, &mut random),
+        run(&with_weight, &series, 30.0, 0.1, Load::Known { mass, at }, &mut random),
+    ];
+    let found = identify(&file, &runs, false).unwrap();
+    assert!(worst_error(&found, &truth) < 4.5);
 }

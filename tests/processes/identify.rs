@@ -227,10 +227,18 @@ fn a_first_motion_leads_to_an_identified_file() {
         let ended = Hexad::spawn(&machine, "identify", typed(&machine, line)).ends_within(HANG);
         println!("{}", ended.stdout);
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-        let [before, after] = ["machine.toml", "NEW.toml"]
-            .map(|file| Config::load(&machine.path(file)).unwrap().machine.actuator.friction_uncertainty);
+        let [by_data_sheet, identified] = ["machine.toml", "NEW.toml"]
+            .map(|file| Config::load(&machine.path(file)).unwrap().machine.actuator);
+        let [before, after] = [&by_data_sheet, &identified].map(|actuator| actuator.friction_uncertainty);
         assert!(after < share * before, "{name}: friction uncertainty {before} N, then {after} N");
         fs::rename(machine.path("NEW.toml"), &machine.file).unwrap();
         session(&machine, &platform, "hexad run --config F --record identified", &motions);
+
+        // The file is that of the recordings that are identified, not of the other motion.
+        let line = "hexad identify empty/*.mcap --validate identified/*.mcap --json";
+        let ended = Hexad::spawn(&machine, "identify", typed(&machine, line)).ends_within(HANG);
+        let json: Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
+        let file = json["legs"][0][1]["file"].as_f64().unwrap();
+        assert_eq!(file, by_data_sheet.coulomb_friction[0], "{name}");
     }
 }

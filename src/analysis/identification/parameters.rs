@@ -2,26 +2,27 @@
 //!
 //! | free parameter | stands for |
 //! | --- | --- |
-//! | 0-9 | platform: log-Cholesky parameters of its pseudo-inertia |
+//! | 0-9 | platform: logarithm of its mass, Cholesky factor of its pseudo-inertia |
 //! | 10-12 | cylinder: logarithms of centre of mass, transverse and axial inertia, relative to the file |
 //! | 13-16 | rod: the same, mass first |
 //! | 17 | reflected mass |
 //! | 18-23, 24-29, 30-35 | viscous and Coulomb friction, load friction, of each leg |
 //! | 36-41 | logarithm of the force scale of each leg |
-//! | 42-51 | payload: log-Cholesky parameters |
+//! | 42-51 | payload: the same as of the platform |
 //!
 //! The pseudo-inertia of a body, with its second moments S, first moments h and mass m, is positive definite exactly if
 //! some distribution of positive mass has them (Wensing, Kim, Slotine, 2018). So is `U U^T` for every triangle U (Rucker,
 //! Wensing, 2022):
 //!
 //! ```text
-//! [ S   h ]                    [ exp d1   s12     s13    t1 ]
-//! [ h^T m ] = U U^T  U = exp a [   0     exp d2   s23    t2 ]      S = tr(I) / 2 - I
-//!                              [   0       0     exp d3  t3 ]
-//!                              [   0       0       0     1  ]
+//! [ S   h ]                    [ d1  s12  s13  t1 ]
+//! [ h^T m ] = U U^T  U = exp a [ 0   d2   s23  t2 ]      S = tr(I) / 2 - I
+//!                              [ 0   0    d3   t3 ]
+//!                              [ 0   0    0    1  ]
 //! ```
 //!
-//! so `m = exp 2a` and t is the centre of mass.
+//! so `m = exp 2a` and t is the centre of mass. The sources have the logarithms of d, too. But of a flat plate or a point mass they
+//! are infinite, and the search would not leave a small size.
 
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 
@@ -56,12 +57,12 @@ const FORCE_SCALE_RATIO: f64 = 0.1;
 /// Of the mass of the platform: reflected mass where the file has none, and a payload before anything is known of it.
 const REFLECTED_PER_PLATFORM: f64 = 0.02;
 const PAYLOAD_PER_PLATFORM: f64 = 0.05;
-/// Deviations of the logarithms of a payload's mass and size, and its size and place over the radius of the platform.
+/// Deviation of the logarithm of a payload's mass; its size, that size's deviation and the deviation of its place over the radius of
+/// the platform.
 const PAYLOAD_MASS_LOG: f64 = 3.0;
-const PAYLOAD_SIZE_LOG: f64 = 1.5;
 const PAYLOAD_SIZE: f64 = 0.2;
-/// Logarithm of the ratio by which a body may be smaller than expected: twenty times.
-const LEAST_SIZE_LOG: f64 = 3.0;
+const PAYLOAD_SIZE_DEVIATION: f64 = 0.4;
+const PAYLOAD_PLACE: f64 = 2.0;
 /// Second moment that a body has at least, as a share of its largest: a flat plate has none across.
 const LEAST_MOMENT: f64 = 1e-5;
 
@@ -91,7 +92,7 @@ impl Parameters {
             Platform { mass, center_of_mass: Vector3::zeros(), inertia: Matrix3::identity() * (mass * size) }
         };
         let mut prior = Free::zeros();
-        prior.fixed_rows_mut::<BODY>(0).copy_from(&log_cholesky(&file.platform));
+        prior.fixed_rows_mut::<BODY>(0).copy_from(&cholesky_parameters(&file.platform));
         prior.fixed_rows_mut::<1>(REFLECTED).fill(actuator.reflected_mass);
         for (first, values) in [
             (VISCOUS, actuator.viscous_friction),
@@ -101,18 +102,19 @@ impl Parameters {
         ] {
             prior.fixed_rows_mut::<LEGS>(first).copy_from(&Vector6::from(values));
         }
-        prior.fixed_rows_mut::<BODY>(LOG_PAYLOAD).copy_from(&log_cholesky(&guess));
+        prior.fixed_rows_mut::<BODY>(LOG_PAYLOAD).copy_from(&cholesky_parameters(&guess));
 
         let mut deviation = Free::repeat(SHAPE_RATIO);
-        let mut body = |first: usize, mass_log: f64, size_log: f64| {
-            let scales = [0.5 * mass_log, size_log, size_log, size_log];
-            deviation.fixed_rows_mut::<4>(first).copy_from(&SVector::<f64, 4>::from(scales));
-            deviation.fixed_rows_mut::<3>(first + 4).fill(SHAPE_RATIO * radius);
-            deviation.fixed_rows_mut::<3>(first + 7).fill(SHAPE_RATIO * radius);
-        };
-        body(0, MASS_RATIO, SHAPE_RATIO);
-        body(LOG_PAYLOAD, PAYLOAD_MASS_LOG, PAYLOAD_SIZE_LOG);
-        deviation.fixed_rows_mut::<3>(LOG_PAYLOAD + 7).fill(2.0 * radius);
+        // A flat plate may be thick: each size may be off by a share of the largest.
+        let size = prior.fixed_rows::<3>(1).amax();
+        for (first, mass_log, size, place) in [
+            (0, MASS_RATIO, SHAPE_RATIO * size, SHAPE_RATIO * radius),
+            (LOG_PAYLOAD, PAYLOAD_MASS_LOG, PAYLOAD_SIZE_DEVIATION * radius, PAYLOAD_PLACE * radius),
+        ] {
+            deviation.row_mut(first).fill(0.5 * mass_log);
+            deviation.fixed_rows_mut::<6>(first + 1).fill(size);
+            deviation.fixed_rows_mut::<3>(first + 7).fill(place);
+        }
         let reflected = REFLECTED_RATIO * actuator.reflected_mass + REFLECTED_PER_PLATFORM * mass;
         let dry = FRICTION_RATIO * actuator.max_force;
         for (first, count, value) in [
@@ -137,13 +139,9 @@ impl Parameters {
         self.deviation.fixed_rows_mut::<LOG_PAYLOAD>(0).scale_mut(HELD);
     }
 
-    /// The nearest parameters with no negative friction and no body of next to no size: the search would not leave it.
+    /// The nearest parameters with no negative friction.
     pub fn within_bounds(&self, mut free: Free) -> Free {
         free.rows_mut(REFLECTED, LOG_SCALE - REFLECTED).apply(|value| *value = value.max(0.0));
-        for size in [1, LOG_PAYLOAD + 1].into_iter().flat_map(|first| first..first + 3) {
-            let least = self.prior.row(size).x - LEAST_SIZE_LOG;
-            free.row_mut(size).apply(|value| *value = value.max(least));
-        }
         free
     }
 
@@ -203,11 +201,11 @@ fn scaled(link: &Link, mass: f64, logs: &Vector3<f64>, ends: [f64; 2]) -> Link {
     scaled
 }
 
-/// Body of log-Cholesky parameters.
+/// Body of Cholesky parameters.
 impl From<&SVector<f64, BODY>> for Platform {
     fn from(parameters: &SVector<f64, BODY>) -> Self {
         let [a, d1, d2, d3, s12, s23, s13, t1, t2, t3]: [f64; BODY] = (*parameters).into();
-        let triangle = Matrix3::new(d1.exp(), s12, s13, 0.0, d2.exp(), s23, 0.0, 0.0, d3.exp());
+        let triangle = Matrix3::new(d1, s12, s13, 0.0, d2, s23, 0.0, 0.0, d3);
         let mass = (2.0 * a).exp();
         // About the centre of mass the columns of t drop out.
         let moments = triangle * triangle.transpose() * mass;
@@ -216,8 +214,8 @@ impl From<&SVector<f64, BODY>> for Platform {
     }
 }
 
-/// Log-Cholesky parameters of a body.
-pub(super) fn log_cholesky(body: &Platform) -> SVector<f64, BODY> {
+/// Cholesky parameters of a body.
+pub(super) fn cholesky_parameters(body: &Platform) -> SVector<f64, BODY> {
     let moments = (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia) / body.mass;
     let moments = moments + Matrix3::identity() * (LEAST_MOMENT * moments.trace());
     // An upper triangle: the lower one of the reversed axes.
@@ -227,5 +225,5 @@ pub(super) fn log_cholesky(body: &Platform) -> SVector<f64, BODY> {
     let u = reversed * lower * reversed;
     let [x, y, z]: [f64; 3] = body.center_of_mass.into();
     let a = 0.5 * body.mass.ln();
-    SVector::from([a, u.m11.ln(), u.m22.ln(), u.m33.ln(), u.m12, u.m23, u.m13, x, y, z])
+    SVector::from([a, u.m11, u.m22, u.m33, u.m12, u.m23, u.m13, x, y, z])
 }

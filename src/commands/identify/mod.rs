@@ -67,6 +67,10 @@ pub enum IdentifyError {
     TooLittle,
     #[error("recordings of two machines: {0} and {1}; identify each alone")]
     TwoMachines(String, String),
+    #[error(
+        "{0} was recorded with other joints (leg.base_m, leg.platform_m) than the recordings before it; record all with one file"
+    )]
+    OtherJoints(PathBuf),
     #[error("--known-mass = {0} kg: must be greater than 0")]
     Weight(f64),
 }
@@ -82,9 +86,10 @@ impl CommandError for IdentifyError {
 impl IdentifyArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let mut recorded = Recorded::default();
-        let [empty, loaded, payload, other] =
-            [&self.recordings, &self.loaded, &self.payload, &self.validate].map(|paths| recorded.read(paths));
-        let (empty, loaded, payload, other) = (empty?, loaded?, payload?, other?);
+        // The file is that of the last recording, which must not be one that only validates.
+        let [other, empty, loaded, payload] =
+            [&self.validate, &self.recordings, &self.loaded, &self.payload].map(|paths| recorded.read(paths));
+        let (other, empty, loaded, payload) = (other?, empty?, loaded?, payload?);
         let (config, text) = recorded.configuration.ok_or(IdentifyError::TooLittle)?;
         let machine = &config.machine;
         let known = self.known_weight()?;

@@ -2,12 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::Vector3;
+
 use super::IdentifyError;
 use crate::analysis::drive_delay::{MeasuredMotion, RecordedStretch};
 use crate::analysis::force_integrals::SentForce;
 use crate::commands::failure::Failure;
 use crate::config::Config;
 use crate::messages::CycleMessage;
+use crate::model::LEGS;
 use crate::recording::Item;
 use crate::recording::reader::Recording;
 
@@ -38,12 +41,24 @@ impl Recorded {
         reader.end();
         let text = summary.info.configuration;
         let config = Config::parse(&text, "configuration of the recording")?;
-        if let Some((other, _)) = self.configuration.as_ref().filter(|(other, _)| other.name != config.name) {
-            return Err(IdentifyError::TwoMachines(other.name.clone(), config.name).into());
+        if let Some((other, _)) = &self.configuration {
+            if other.name != config.name {
+                return Err(IdentifyError::TwoMachines(other.name.clone(), config.name).into());
+            }
+            // The recorded poses were computed from them.
+            if joints(other) != joints(&config) {
+                return Err(IdentifyError::OtherJoints(path.into()).into());
+            }
         }
         self.configuration = Some((config, text));
         Ok(reader.stretches)
     }
+}
+
+/// Joint centres of base and platform.
+fn joints(config: &Config) -> [[Vector3<f64>; LEGS]; 2] {
+    let joints = &config.machine.joints;
+    [&joints.base, &joints.platform].map(|centers| joints.triples.unpack_vectors(centers))
 }
 
 /// Reader that collects cycles under control.
