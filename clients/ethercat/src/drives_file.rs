@@ -1,0 +1,289 @@
+//! `NAME-drives.toml`: interface, timing, and the six drives of a machine.
+
+use hexad::model::LEGS;
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use crate::units::LegUnits;
+
+/// Drives of one machine.
+#[derive(Clone, Debug)]
+pub struct DrivesFile {
+    /// Bus and timing.
+    pub bus: BusSection,
+    /// In the order of the legs.
+    pub legs: [LegSection; LEGS],
+}
+
+/// Top level of the file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BusSection {
+    /// `name` of the machine file.
+    pub name: String,
+    /// Network interface that only the drives are connected to.
+    pub interface: String,
+    /// Period of SYNC0, and of the daemon's loop.
+    #[serde(default = "default::period_us")]
+    pub period_us: u32,
+    /// The drives stop by themselves after so long without outputs.
+    #[serde(default = "default::watchdog_ms")]
+    pub watchdog_ms: u32,
+    /// Frames lost in a row that stop all drives.
+    #[serde(default = "default::lost_frames")]
+    pub lost_frames: u32,
+    /// Longest wait for the forces that respond to a measurement.
+    #[serde(default = "default::answer_us")]
+    pub answer_us: u32,
+    /// From SYNC0, at which the encoders are latched, to the frame that fetches them.
+    #[serde(default = "default::shift_us")]
+    pub shift_us: u32,
+    /// How the drives stop when no force may be applied.
+    #[serde(default)]
+    pub on_brake: OnBrake,
+}
+
+/// Reaction when no force may be applied.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnBrake {
+    /// Quick stop of the drive (0x605a), which closes the brake.
+    #[default]
+    QuickStop,
+    /// Power off; the brake closes.
+    DisableVoltage,
+}
+
+/// One drive and its leg.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegSection {
+    /// Position on the bus, from 1.
+    pub position: usize,
+    /// Vendor of the drive.
+    pub vendor: u32,
+    /// Product code.
+    pub product: u32,
+    /// Serial number of the drive whose encoder the offset belongs to.
+    pub serial: u32,
+    /// Station alias, where it is checked.
+    pub alias: Option<u16>,
+    /// Of the motor's encoder.
+    pub counts_per_rev: f64,
+    /// Revolutions of the motor for one of the screw.
+    #[serde(default = "default::one")]
+    pub gear: f64,
+    /// Travel for one revolution of the screw.
+    pub lead_m: f64,
+    /// Of gear and screw.
+    #[serde(default = "default::one")]
+    pub efficiency: f64,
+    /// 1 if increasing counts and positive torque lengthen the leg, else -1.
+    pub sign: i8,
+    /// Length at count 0; written by `zero`.
+    pub offset_m: f64,
+    /// Of the motor.
+    pub rated_torque_n_m: f64,
+    /// Largest command in thousandths of the rated torque.
+    pub max_torque_permille: i16,
+    /// How the open brake is known.
+    pub brake: Brake,
+    /// Objects to be written at the start.
+    #[serde(default)]
+    pub sdo: Vec<SdoWrite>,
+    /// Object that maps the outputs; the driver writes the mapping.
+    #[serde(default = "default::rx_pdo")]
+    pub rx_pdo: u16,
+    /// Object that maps the inputs.
+    #[serde(default = "default::tx_pdo")]
+    pub tx_pdo: u16,
+}
+
+/// How the open brake is known: CiA 402 has no standard bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Brake {
+    /// Bit of the status word (0x6041).
+    StatusBit(u8),
+    /// Bit of the digital inputs (0x60fd).
+    InputBit(u8),
+    /// Time after operation enabled \[ms\].
+    OpenMs(u32),
+}
+
+/// Object and its value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SdoWrite {
+    /// Index of the object.
+    pub index: u16,
+    /// Subindex.
+    #[serde(default)]
+    pub sub: u8,
+    /// 1, 2 or 4.
+    pub bytes: u8,
+    /// The value; negative ones in two's complement.
+    pub value: i64,
+}
+
+mod default {
+    pub fn period_us() -> u32 {
+        1000
+    }
+    pub fn watchdog_ms() -> u32 {
+        20
+    }
+    pub fn lost_frames() -> u32 {
+        3
+    }
+    pub fn answer_us() -> u32 {
+        400
+    }
+    pub fn shift_us() -> u32 {
+        100
+    }
+    pub fn one() -> f64 {
+        1.0
+    }
+    pub fn rx_pdo() -> u16 {
+        0x1600
+    }
+    pub fn tx_pdo() -> u16 {
+        0x1a00
+    }
+}
+
+/// All errors of a file, a line each.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct FileErrors(pub Vec<String>);
+
+impl DrivesFile {
+    /// Reads and checks a text; error texts name it `place`.
+    pub fn parse(text: &str, place: &str) -> Result<Self, FileErrors> {
+        let mut table: Table = text.parse().map_err(|error| FileErrors(vec![format!("{place}: {error}")]))?;
+        let defaults = match table.remove("drive") {
+            Some(Value::Table(defaults)) => defaults,
+            _ => Table::new(),
+        };
+        let rows = match table.remove("leg") {
+            Some(Value::Array(rows)) => rows,
+            _ => vec![],
+        };
+        let mut errors = vec![];
+        let mut log = |section: &str, error: String| errors.push(format!("{place}: {section}{error}"));
+        if rows.len() != LEGS {
+            log("", format!("has {} sections [[leg]], needs {LEGS}", rows.len()));
+        }
+        let bus = read::<BusSection>(table).map_err(|error| log("", error)).ok();
+        bus.iter().flat_map(BusSection::errors).for_each(|error| log("", error));
+        let mut legs = vec![];
+        for (number, row) in (1..).zip(rows) {
+            let section = format!("leg[{number}].");
+            let Value::Table(row) = row else { continue };
+            let mut merged = defaults.clone();
+            merged.entry("position").or_insert(Value::Integer(number));
+            merged.extend(row);
+            match read::<LegSection>(merged) {
+                Ok(leg) => {
+                    leg.errors().into_iter().for_each(|error| log(&section, error));
+                    legs.push(leg);
+                }
+                Err(error) => log(&section, error),
+            }
+        }
+        for (index, leg) in legs.iter().enumerate() {
+            if legs.iter().take(index).any(|other| other.position == leg.position) {
+                log(&format!("leg[{}].", index + 1), format!("position = {} is used twice", leg.position));
+            }
+        }
+        match (bus, legs.try_into()) {
+            (Some(bus), Ok(legs)) if errors.is_empty() => Ok(Self { bus, legs }),
+            _ => Err(FileErrors(errors)),
+        }
+    }
+
+    /// Legs, counted from 0, in the order of their drives on the bus.
+    pub fn by_position(&self) -> [(usize, &LegSection); LEGS] {
+        let mut next = 0..;
+        let mut legs = self.legs.each_ref().map(|leg| (next.next().unwrap_or_default(), leg));
+        legs.sort_by_key(|(_, leg)| leg.position);
+        legs
+    }
+}
+
+fn read<T: for<'d> Deserialize<'d>>(table: Table) -> Result<T, String> {
+    Value::Table(table).try_into().map_err(|error| error.to_string().trim().replace('\n', " "))
+}
+
+/// The error of a key whose value is outside of its bounds.
+fn outside(key: &str, value: f64, low: f64, high: f64) -> Option<String> {
+    let is_inside = (low..=high).contains(&value);
+    (!is_inside).then(|| format!("{key} = {value}: must be in [{low}, {high}]"))
+}
+
+impl BusSection {
+    fn errors(&self) -> Vec<String> {
+        let period_us = f64::from(self.period_us);
+        let half = period_us / 2.0;
+        [
+            outside("period_us", period_us, 250.0, 10_000.0),
+            outside("watchdog_ms", f64::from(self.watchdog_ms), (2.0 * period_us / 1000.0).ceil(), 100.0),
+            outside("lost_frames", f64::from(self.lost_frames), 1.0, 10.0),
+            outside("shift_us", f64::from(self.shift_us), 0.0, half),
+            outside("answer_us", f64::from(self.answer_us), 50.0, half),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+impl LegSection {
+    fn errors(&self) -> Vec<String> {
+        let bit = match self.brake {
+            Brake::StatusBit(bit) => outside("brake.status_bit", f64::from(bit), 0.0, 15.0),
+            Brake::InputBit(bit) => outside("brake.input_bit", f64::from(bit), 0.0, 31.0),
+            Brake::OpenMs(time) => outside("brake.open_ms", f64::from(time), 0.0, 2000.0),
+        };
+        let sizes = self.sdo.iter().filter(|write| !matches!(write.bytes, 1 | 2 | 4));
+        let mut errors: Vec<String> = [
+            outside("position", self.position as f64, 1.0, LEGS as f64),
+            outside("counts_per_rev", self.counts_per_rev, 100.0, 1e9),
+            outside("gear", self.gear, 0.01, 1000.0),
+            outside("lead_m", self.lead_m, 1e-4, 1.0),
+            outside("efficiency", self.efficiency, 0.1, 1.0),
+            outside("offset_m", self.offset_m, -1e4, 1e4),
+            outside("rated_torque_n_m", self.rated_torque_n_m, 1e-3, 1e4),
+            outside("max_torque_permille", f64::from(self.max_torque_permille), 1.0, 30_000.0),
+            (self.sign.abs() != 1).then(|| format!("sign = {}: must be 1 or -1", self.sign)),
+            bit,
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        errors
+            .extend(sizes.map(|write| {
+                format!("sdo {:#06x}: bytes = {}: must be 1, 2 or 4", write.index, write.bytes)
+            }));
+        errors
+    }
+
+    /// Encoder, screw and motor.
+    pub fn units(&self) -> LegUnits {
+        LegUnits {
+            counts_per_rev: self.counts_per_rev,
+            gear: self.gear,
+            lead_m: self.lead_m,
+            efficiency: self.efficiency,
+            sign: f64::from(self.sign),
+            offset_m: self.offset_m,
+            rated_torque_n_m: self.rated_torque_n_m,
+        }
+    }
+
+    /// Largest force of the drive within its limit \[N\].
+    pub fn max_force_n(&self) -> f64 {
+        self.units().newtons_per_permille().abs() * f64::from(self.max_torque_permille)
+    }
+}

@@ -1,0 +1,21 @@
+//! Driver of hexad for CiA 402 drives on EtherCAT, and a simulated segment of them.
+//!
+//! | module | computes |
+//! | --- | --- |
+//! | [`cia402`], [`objects`], [`units`] | states and words of a drive, its objects, counts and lengths, torques and forces; they know no bus |
+//! | [`segment`] | six simulated drives, and the simulated platform that they move |
+//! | [`link`], [`simulated_link`], [`timer`] | Ethernet frames and their clock: real, or simulated |
+
+pub mod bus;
+pub mod cia402;
+pub mod drives_file;
+pub mod link;
+pub mod objects;
+pub mod process_image;
+pub mod segment;
+pub mod simulated_link;
+pub mod simulation;
+pub mod startup;
+pub mod sync_clock;
+pub mod timer;
+pub mod units;
