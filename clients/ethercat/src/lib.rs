@@ -8,9 +8,12 @@
 
 pub mod bus;
 pub mod cia402;
+pub mod cycle;
 pub mod drives_file;
+pub mod leg_drive;
 pub mod link;
 pub mod objects;
+pub mod permission;
 pub mod process_image;
 pub mod segment;
 pub mod simulated_link;

@@ -59,6 +59,12 @@ impl SimulatedLink {
     }
 }
 
+impl AsRef<Segment> for SimulatedLink {
+    fn as_ref(&self) -> &Segment {
+        &self.segment
+    }
+}
+
 impl Link for SimulatedLink {
     fn now_ns(&self) -> u64 {
         self.now_ns

@@ -24,7 +24,7 @@ pub type PreOpDevices = SubDeviceGroup<MAX_DEVICES, MAX_PROCESS_DATA>;
 pub type OpDevices = SubDeviceGroup<MAX_DEVICES, MAX_PROCESS_DATA, DefaultLock, Op, HasDc>;
 
 /// Address that ethercrab gives to the first device.
-const FIRST_ADDRESS: u16 = 0x1000;
+pub(crate) const FIRST_ADDRESS: u16 = 0x1000;
 /// From the configuration of SYNC0 to its first pulse.
 const SYNC0_DELAY: Duration = Duration::from_millis(50);
 /// Cycles within which all devices must be in OP.

@@ -21,7 +21,8 @@ pub fn drives() -> DrivesFile {
 pub fn machine() -> Config {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/motion_base.toml");
     let text = std::fs::read_to_string(path).unwrap();
-    Config::parse(&text, "motion_base").unwrap()
+    let text = format!("{text}\n[realtime]\nrelease = \"external\"\n[drive]\ndelay_us = 1000.0\n");
+    Config::parse(&text, "motion_base").unwrap_or_else(|error| panic!("{error}"))
 }
 
 pub fn segment() -> Segment {

@@ -3,4 +3,6 @@
 
 mod common;
 
+mod closed_loop;
+mod rig;
 mod startup;
