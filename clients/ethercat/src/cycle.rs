@@ -129,13 +129,13 @@ impl<D: Daemon> Driver<D> {
         bus.wire.link.sleep_until(fetch_ns);
         self.clock.advance_to(bus.wire.link.now_ns());
         let exchange = self.exchange(bus, devices, period_ns / 4);
+        self.supervise(exchange);
         if exchange == Exchange::Complete {
             self.publish();
             self.wait_for_forces(bus);
         } else {
             self.receive_forces(bus.wire.link.now_ns());
         }
-        self.supervise(exchange);
         self.command(bus.wire.link.now_ns());
         if self.outputs != self.sent {
             let last_ns = self.clock.next_sync0_ns() - period_ns / SECOND_EXCHANGE_SHARE;

@@ -70,6 +70,11 @@ impl Segment {
         Self { devices, mechanics, reachable: LEGS, leg_of_device, now_ns }
     }
 
+    /// Instant until which the mechanics have been simulated: that of the last SYNC0 \[ns\].
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
     /// Simulates until an instant \[ns\].
     pub fn advance_to(&mut self, until_ns: u64) {
         loop {

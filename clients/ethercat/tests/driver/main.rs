@@ -4,5 +4,6 @@
 mod common;
 
 mod closed_loop;
+mod failures;
 mod rig;
 mod startup;

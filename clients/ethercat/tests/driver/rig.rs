@@ -27,7 +27,8 @@ const ANSWER_NS: u64 = 150_000;
 /// Controller with a setpoint source, without threads or topics.
 pub struct TestDaemon {
     controller: Controller,
-    machine: Config,
+    /// Pose before the motion.
+    rest: [f64; 6],
     scene: FittedMotion,
     timeline: Timeline,
     /// Instant at which the motion starts \[ns\].
@@ -50,7 +51,7 @@ impl TestDaemon {
         let home = machine.machine.home.into();
         Self {
             controller: Controller::new(&machine.machine, parameters),
-            machine: machine.clone(),
+            rest: machine.machine.home,
             scene,
             timeline: Timeline::new(&machine.machine, &home, &scene.at(0.0).x, scene.duration),
             motion_ns: None,
@@ -69,10 +70,15 @@ impl TestDaemon {
         self.request = Some(OperatorRequest { request, message: MessageId { epoch: 1, sequence } });
     }
 
+    /// Holds a pose until the motion starts.
+    pub fn hold(&mut self, pose: [f64; 6]) {
+        self.rest = pose;
+    }
+
     /// Setpoint of an instant \[ns\].
     pub fn task(&self, time_ns: u64) -> TaskState {
         let Some(motion_ns) = self.motion_ns else {
-            return TaskState::at_rest(self.machine.machine.home);
+            return TaskState::at_rest(self.rest);
         };
         let t = time_ns.saturating_sub(motion_ns) as f64 * 1e-9;
         self.timeline.at(t % self.timeline.end(), |t| self.scene.at(t))
