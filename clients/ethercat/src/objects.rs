@@ -28,3 +28,5 @@ pub const ACTUAL_TORQUE: u16 = 0x6077;
 pub const DIGITAL_INPUTS: u16 = 0x60fd;
 /// Modes that the drive has.
 pub const SUPPORTED_MODES: u16 = 0x6502;
+/// Increments of the encoder, and the revolutions of the motor for them.
+pub const ENCODER_RESOLUTION: u16 = 0x608f;

@@ -10,12 +10,14 @@ pub struct Permission {
     longest_age_ns: u64,
     /// A failure of the bus or a drive has ended the permission.
     is_stopped: bool,
+    /// The driver ends.
+    is_ended: bool,
 }
 
 impl Permission {
     /// No permission until a message grants it. A message counts for no longer than `longest_age_ns`.
     pub fn new(longest_age_ns: u64) -> Self {
-        Self { newest: ForceMessage::default(), longest_age_ns, is_stopped: true }
+        Self { newest: ForceMessage::default(), longest_age_ns, is_stopped: true, is_ended: false }
     }
 
     /// Takes in a message. After a failure forces may be applied again once the daemon has sent one that is not valid: it has
@@ -34,9 +36,15 @@ impl Permission {
         !was_stopped && self.newest.valid == 1
     }
 
+    /// Ends the permission for good.
+    pub fn end(&mut self) {
+        self.is_ended = true;
+    }
+
     /// Forces that may be applied now \[N\].
     pub fn forces(&self, now_ns: u64) -> Option<[f64; 6]> {
-        let may_be_applied = !self.is_stopped && self.newest.may_be_applied(now_ns, self.longest_age_ns);
+        let is_permitted = !self.is_stopped && !self.is_ended;
+        let may_be_applied = is_permitted && self.newest.may_be_applied(now_ns, self.longest_age_ns);
         may_be_applied.then_some(self.newest.force_n)
     }
 

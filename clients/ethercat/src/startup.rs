@@ -104,13 +104,32 @@ impl<L: Link> Bus<'_, L> {
         })
     }
 
+    /// Value of an object of 1, 2 or 4 bytes.
+    pub fn sdo_value(
+        &mut self,
+        devices: &PreOpDevices,
+        position: usize,
+        index: u16,
+        sub: u8,
+    ) -> Result<i64, String> {
+        // A response that is shorter than the type is an error of its own kind.
+        let value = match self.sdo_read::<i32>(devices, position, index, sub) {
+            Err(Error::Wire(_)) => match self.sdo_read::<i16>(devices, position, index, sub) {
+                Err(Error::Wire(_)) => self.sdo_read::<i8>(devices, position, index, sub).map(i64::from),
+                other => other.map(i64::from),
+            },
+            other => other.map(i64::from),
+        };
+        value.map_err(words)
+    }
+
     /// Writes an object.
     pub fn sdo_write(
         &mut self,
         devices: &PreOpDevices,
         position: usize,
         write: SdoWrite,
-    ) -> Result<(), Error> {
+    ) -> Result<(), String> {
         let SdoWrite { index, sub, bytes, value } = write;
         self.with_emergency(|bus| {
             let device = devices.subdevice(&bus.main, position)?;
@@ -120,6 +139,7 @@ impl<L: Link> Bus<'_, L> {
                 _ => bus.wire.run(device.sdo_write(index, sub, value as u32)),
             }
         })
+        .map_err(words)
     }
 
     /// Repeats a transfer in whose place the device sent an emergency. Each emergency is kept in the wire's list.
@@ -302,7 +322,7 @@ fn configure<L: Link>(
     }
     writes.push(one(objects::MODE, 0, 1, crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE as u32));
     for write in writes {
-        bus.sdo_write(devices, position, write).map_err(words)?;
+        bus.sdo_write(devices, position, write)?;
     }
     // The unit of the watchdog is 100 us by default.
     let wanted = timing.watchdog_ms as u16 * 10;

@@ -85,7 +85,12 @@ impl Device {
         Self {
             model,
             drive: ServoDrive::default(),
-            objects: ObjectDictionary::new(model.identity, rated_mn_m, model.max_torque_permille),
+            objects: ObjectDictionary::new(
+                model.identity,
+                model.units.counts_per_rev as u32,
+                rated_mn_m,
+                model.max_torque_permille,
+            ),
             refusal: None,
             is_watchdog_fixed: false,
             emergency: None,

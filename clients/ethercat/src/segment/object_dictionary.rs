@@ -37,7 +37,12 @@ pub struct ObjectDictionary(BTreeMap<(u16, u8), Object>);
 
 impl ObjectDictionary {
     /// Objects of a drive with a motor of this rated torque.
-    pub fn new(identity: Identity, rated_torque_mn_m: u32, max_torque_permille: u16) -> Self {
+    pub fn new(
+        identity: Identity,
+        counts_per_rev: u32,
+        rated_torque_mn_m: u32,
+        max_torque_permille: u16,
+    ) -> Self {
         let mut objects = BTreeMap::new();
         let mut add = |index, sub, value: u64, bytes, is_writable| {
             objects.insert((index, sub), Object { value, bytes, is_writable });
@@ -62,6 +67,8 @@ impl ObjectDictionary {
         ] {
             add(index, 0, 0, bytes, false);
         }
+        add(objects::ENCODER_RESOLUTION, 1, u64::from(counts_per_rev), 4, false);
+        add(objects::ENCODER_RESOLUTION, 2, 1, 4, false);
         add(objects::RATED_TORQUE, 0, u64::from(rated_torque_mn_m), 4, false);
         add(
             objects::SUPPORTED_MODES,
@@ -84,22 +91,7 @@ impl ObjectDictionary {
         ] {
             add(index, sub, value, bytes, true);
         }
-        let outputs = [0x6040_0010u32, 0x6071_0010, 0x6060_0008];
-        let inputs = [0x6041_0010u32, 0x6064_0020, 0x6077_0010, 0x6061_0008];
-        for (mapping, assignment, entries) in [
-            (0x1600, objects::RX_PDO_ASSIGNMENT, &outputs[..]),
-            (0x1a00, objects::TX_PDO_ASSIGNMENT, &inputs[..]),
-        ] {
-            for sub in 0..=2u8 {
-                let value = [1, u64::from(mapping), 0][usize::from(sub)];
-                add(assignment, sub, value, if sub == 0 { 1 } else { 2 }, true);
-            }
-            add(mapping, 0, entries.len() as u64, 1, true);
-            for sub in 1..=8u8 {
-                let entry = entries.get(usize::from(sub) - 1).copied().unwrap_or(0);
-                add(mapping, sub, u64::from(entry), 4, true);
-            }
-        }
+        map_process_data(&mut objects);
         Self(objects)
     }
 
@@ -213,5 +205,27 @@ impl ObjectDictionary {
         }
         object.value = u64::from(value) & (!0 >> (64 - 8 * u32::from(object.bytes)));
         Ok(())
+    }
+}
+
+/// Mapping with which a drive is delivered.
+fn map_process_data(objects: &mut BTreeMap<(u16, u8), Object>) {
+    let outputs = [0x6040_0010u32, 0x6071_0010, 0x6060_0008];
+    let inputs = [0x6041_0010u32, 0x6064_0020, 0x6077_0010, 0x6061_0008];
+    for (mapping, assignment, entries) in [
+        (0x1600, objects::RX_PDO_ASSIGNMENT, &outputs[..]),
+        (0x1a00, objects::TX_PDO_ASSIGNMENT, &inputs[..]),
+    ] {
+        for sub in 0..=2u8 {
+            let value = [1, u64::from(mapping), 0][usize::from(sub)];
+            let bytes = if sub == 0 { 1 } else { 2 };
+            objects.insert((assignment, sub), Object { value, bytes, is_writable: true });
+        }
+        let count = Object { value: entries.len() as u64, bytes: 1, is_writable: true };
+        objects.insert((mapping, 0), count);
+        for sub in 1..=8u8 {
+            let entry = entries.get(usize::from(sub) - 1).copied().unwrap_or(0);
+            objects.insert((mapping, sub), Object { value: entry.into(), bytes: 4, is_writable: true });
+        }
     }
 }

@@ -139,7 +139,7 @@ fn single_lost_frames_change_nothing() {
     rig.cycles(20_000);
     assert_eq!(rig.state(), State::Active, "{:?}", rig.driver.daemon.output.diagnostic);
     let counts = rig.driver.counts;
-    assert!(counts.lost_frames > 200 && counts.stops == 0, "{counts:?}");
+    assert!(rig.driver.data.lost_frames > 200 && counts.stops == 0, "{counts:?}");
 }
 
 #[test]

@@ -15,6 +15,7 @@ use hexad_ethercat::bus::Bus;
 use hexad_ethercat::cia402::DriveState;
 use hexad_ethercat::cycle::{Daemon, DevicesLost, Driver};
 use hexad_ethercat::drives_file::DrivesFile;
+use hexad_ethercat::process_data::ProcessData;
 use hexad_ethercat::segment::Segment;
 use hexad_ethercat::segment::mechanics::Mechanics;
 use hexad_ethercat::startup::OpDevices;
@@ -99,7 +100,7 @@ impl TestDaemon {
             ..Input::default()
         };
         self.output = self.controller.step(&input);
-        self.output.clone()
+        self.output
     }
 }
 
@@ -151,7 +152,7 @@ impl<'f> Rig<'f> {
         let actuator = &machine.machine.actuator;
         let middle_m = actuator.min_length.midpoint(actuator.max_length);
         let daemon = TestDaemon::new(&machine, motion, seconds);
-        let driver = Driver::new(file, middle_m, clock, daemon);
+        let driver = Driver::new(ProcessData::new(file, middle_m, clock), &file.bus, daemon);
         Self { bus, devices, driver }
     }
 

@@ -1,0 +1,80 @@
+//! A drives file from what is on the bus: the user completes it.
+
+use std::fmt::Write;
+
+use crate::bus::Bus;
+use crate::link::Link;
+use crate::objects;
+use crate::startup::{PreOpDevices, identities};
+
+/// Text of the file. Lines that only the user can complete are comments with `?`.
+pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str, interface: &str) -> String {
+    let mut text = format!(
+        "name = \"{name}\"\ninterface = \"{interface}\"\nperiod_us = 1000\nwatchdog_ms = 20\nlost_frames = 3\nanswer_us = 400\n\
+         shift_us = 100\non_brake = \"quick_stop\"\n\n[drive]\n# For all legs; a [[leg]] may differ. Complete these:\n\
+         # lead_m = ?        # travel for one revolution of the screw\n# sign = ?          # 1 or -1, see jog\n\
+         # offset_m = ?      # length at count 0, see zero\n\
+         # brake = ?         # {{ status_bit = 12 }}, {{ input_bit = 16 }} or {{ open_ms = 200 }}\n\
+         gear = 1.0\nefficiency = 1.0\n"
+    );
+    for (position, identity) in identities(bus, devices).into_iter().enumerate() {
+        let mut read = |index, sub| bus.sdo_read::<u32>(devices, position, index, sub).ok();
+        let rated_n_m = read(objects::RATED_TORQUE, 0).map(|value| f64::from(value) * 1e-3);
+        let increments = read(objects::ENCODER_RESOLUTION, 1).map(f64::from);
+        let revolutions = read(objects::ENCODER_RESOLUTION, 2).map_or(1.0, f64::from);
+        let max_torque = bus.sdo_read::<u16>(devices, position, objects::MAX_TORQUE, 0).ok();
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "\n[[leg]]\nposition = {}\nvendor = {:#x}\nproduct = {:#x}\nserial = {}\n",
+            position + 1,
+            identity.vendor,
+            identity.product,
+            identity.serial
+        );
+        for (key, value) in [
+            ("counts_per_rev", increments.map(|increments| increments / revolutions)),
+            ("rated_torque_n_m", rated_n_m),
+        ] {
+            let _ = match value {
+                Some(value) => writeln!(text, "{key} = {value:?}"),
+                None => writeln!(text, "# {key} = ?"),
+            };
+        }
+        let _ = match max_torque {
+            Some(value) => writeln!(text, "max_torque_permille = {value}"),
+            None => writeln!(text, "# max_torque_permille = ?"),
+        };
+    }
+    text
+}
+
+/// The text of a file with another offset and serial number of a leg, from 1; the rest stays as it is.
+pub fn with_offset(text: &str, leg: usize, offset_m: f64, serial: u32) -> Option<String> {
+    let start = text.match_indices("[[leg]]").nth(leg.checked_sub(1)?)?.0;
+    let end = text.get(start + 7..)?.find("[[leg]]").map_or(text.len(), |next| start + 7 + next);
+    let (before, section, after) = (text.get(..start)?, text.get(start..end)?, text.get(end..)?);
+    let is_replaced = |line: &str| {
+        let key = line.split('=').next().unwrap_or_default().trim();
+        key == "offset_m" || key == "serial"
+    };
+    let mut lines = section.lines().filter(|line| !is_replaced(line));
+    let first = lines.next()?;
+    let rest: String = lines.map(|line| format!("{line}\n")).collect();
+    Some(format!("{before}{first}\nserial = {serial}\noffset_m = {offset_m:?}\n{rest}{after}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_offset_and_serial_of_the_leg_change() {
+        let text = "a = 1\n[[leg]]\nserial = 1\n[[leg]] # second\nx = 2\noffset_m = 0.5 # old\n\n[[leg]]\nserial = 3\n";
+        let found = with_offset(text, 2, 1.25, 22).unwrap();
+        let expected = "a = 1\n[[leg]]\nserial = 1\n[[leg]] # second\nserial = 22\noffset_m = 1.25\nx = 2\n\n[[leg]]\nserial = 3\n";
+        assert_eq!(found, expected);
+        assert!(with_offset(text, 4, 0.0, 1).is_none());
+        assert!(with_offset(text, 0, 0.0, 1).is_none());
+    }
+}
