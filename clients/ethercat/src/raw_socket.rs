@@ -5,7 +5,7 @@ use std::ffi::CString;
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener};
-use std::{fs, io, mem};
+use std::{io, mem};
 
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock;
@@ -49,24 +49,19 @@ impl RawSocket {
     pub fn open(name: &str) -> Result<Self, InterfaceError> {
         use InterfaceError::{Busy, Missing, NoCarrier, NoRight, System};
         let system = |error| System(name.into(), error);
-        let is_name = !name.is_empty() && !name.contains(['/', '\0']);
-        let folder = format!("/sys/class/net/{name}");
-        if !is_name || fs::metadata(&folder).is_err() {
-            return Err(Missing(name.into()));
-        }
-        // The file cannot be read while the interface is down.
-        if fs::read_to_string(format!("{folder}/carrier")).map(|text| text.trim() != "1").unwrap_or(true) {
-            return Err(NoCarrier(name.into()));
-        }
+        let index = interface_index(name).ok_or_else(|| Missing(name.into()))?;
         let address = SocketAddr::from_abstract_name(format!("hexad-ethercat/{name}")).map_err(system)?;
         let reservation = UnixListener::bind_addr(&address).map_err(|error| match error.kind() {
             io::ErrorKind::AddrInUse => Busy(name.into()),
             _ => system(error),
         })?;
-        let socket = bound_socket(name).map_err(|error| match error.kind() {
+        let socket = bound_socket(index).map_err(|error| match error.kind() {
             io::ErrorKind::PermissionDenied => NoRight(name.into()),
             _ => system(error),
         })?;
+        if !has_carrier(&socket, name).map_err(system)? {
+            return Err(NoCarrier(name.into()));
+        }
         Ok(Self { socket, _reservation: reservation })
     }
 }
@@ -75,24 +70,40 @@ fn checked(result: i32) -> io::Result<i32> {
     if result < 0 { Err(io::Error::last_os_error()) } else { Ok(result) }
 }
 
-fn bound_socket(name: &str) -> io::Result<OwnedFd> {
+/// Number of an interface.
+fn interface_index(name: &str) -> Option<i32> {
+    let name = CString::new(name).ok()?;
+    // SAFETY: the name is a string that ends with 0 and lives during the call.
+    let index = unsafe { libc::if_nametoindex(name.as_ptr()) };
+    i32::try_from(index).ok().filter(|index| *index > 0)
+}
+
+/// Whether an interface is up and something is connected.
+fn has_carrier(socket: &OwnedFd, name: &str) -> io::Result<bool> {
+    // SAFETY: all zeros are a valid value of this struct of numbers.
+    let mut request: libc::ifreq = unsafe { mem::zeroed() };
+    for (to, from) in request.ifr_name.iter_mut().zip(name.bytes().take(libc::IFNAMSIZ - 1)) {
+        *to = from as libc::c_char;
+    }
+    // SAFETY: the request is valid and writable during the call, and its name ends with 0.
+    checked(unsafe { libc::ioctl(socket.as_raw_fd(), libc::SIOCGIFFLAGS, &raw mut request) })?;
+    // SAFETY: this call fills in the flags of the union.
+    let flags = unsafe { request.ifr_ifru.ifru_flags };
+    Ok(i32::from(flags) & libc::IFF_RUNNING != 0)
+}
+
+fn bound_socket(index: i32) -> io::Result<OwnedFd> {
     let kind = libc::SOCK_RAW | libc::SOCK_NONBLOCK | libc::SOCK_CLOEXEC;
     let protocol = ETHERCAT.to_be();
     // SAFETY: the call takes numbers only.
     let number = checked(unsafe { libc::socket(libc::AF_PACKET, kind, protocol.into()) })?;
     // SAFETY: the descriptor is new and belongs to nobody else.
     let socket = unsafe { OwnedFd::from_raw_fd(number) };
-    let name = CString::new(name)?;
-    // SAFETY: the name is a string that ends with 0 and lives during the call.
-    let index = unsafe { libc::if_nametoindex(name.as_ptr()) };
-    if index == 0 {
-        return Err(io::Error::last_os_error());
-    }
     // SAFETY: all zeros are a valid value of this struct of numbers.
     let mut address: libc::sockaddr_ll = unsafe { mem::zeroed() };
     address.sll_family = libc::AF_PACKET as u16;
     address.sll_protocol = protocol;
-    address.sll_ifindex = index as i32;
+    address.sll_ifindex = index;
     let length = size_of::<libc::sockaddr_ll>() as u32;
     // SAFETY: `address` is valid during the call and `length` is its size.
     checked(unsafe { libc::bind(number, (&raw const address).cast(), length) })?;

@@ -1,6 +1,6 @@
 //! From a bus whose devices are in any state to six drives in OP, with every error in words.
 
-use ethercrab::error::{Error, MailboxError};
+use ethercrab::error::{Error, MailboxError, PduError};
 use ethercrab::subdevice_group::{DcConfiguration, HasDc, Op};
 use ethercrab::{
     AlStatusCode, Command, DcSync, DefaultLock, EtherCrabWireReadSized, RegisterAddress, SubDeviceGroup,
@@ -113,9 +113,12 @@ impl<L: Link> Bus<'_, L> {
         sub: u8,
     ) -> Result<i64, String> {
         // A response that is shorter than the type is an error of its own kind.
+        let is_short = |error: &Error| matches!(error, Error::Wire(_) | Error::Pdu(PduError::Decode));
         let value = match self.sdo_read::<i32>(devices, position, index, sub) {
-            Err(Error::Wire(_)) => match self.sdo_read::<i16>(devices, position, index, sub) {
-                Err(Error::Wire(_)) => self.sdo_read::<i8>(devices, position, index, sub).map(i64::from),
+            Err(error) if is_short(&error) => match self.sdo_read::<i16>(devices, position, index, sub) {
+                Err(error) if is_short(&error) => {
+                    self.sdo_read::<i8>(devices, position, index, sub).map(i64::from)
+                }
                 other => other.map(i64::from),
             },
             other => other.map(i64::from),

@@ -52,6 +52,8 @@ pub struct Device {
     pub objects: ObjectDictionary,
     /// AL status code with which a change to a state is refused.
     pub refusal: Option<(u8, u16)>,
+    /// The encoder counts against the direction of the torque.
+    pub is_encoder_reversed: bool,
     /// The watchdog cannot be set.
     pub is_watchdog_fixed: bool,
     /// Error code of an emergency that the device is about to send: before its response to the next request, or at once in OP.
@@ -92,6 +94,7 @@ impl Device {
                 model.max_torque_permille,
             ),
             refusal: None,
+            is_encoder_reversed: false,
             is_watchdog_fixed: false,
             emergency: None,
             memory,
@@ -398,7 +401,8 @@ impl Device {
 
     fn latch_inputs(&mut self, length_m: f64) {
         let drive = &self.drive;
-        let position = self.model.units.counts(length_m) as i32;
+        let counts = self.model.units.counts(length_m);
+        let position = if self.is_encoder_reversed { -counts } else { counts } as i32;
         for (index, value) in [
             (objects::STATUS_WORD, u64::from(drive.status_word())),
             (objects::POSITION, u64::from(position as u32)),
