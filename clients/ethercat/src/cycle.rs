@@ -119,7 +119,8 @@ impl<D: Daemon> Driver<D> {
             }
         }
         self.recover(bus);
-        self.missing_cycles = if exchange == Exchange::Complete { 0 } else { self.missing_cycles + 1 };
+        let is_answered = matches!(exchange, Exchange::Complete | Exchange::Early);
+        self.missing_cycles = if is_answered { 0 } else { self.missing_cycles + 1 };
         let reachable = self.data.states.iter().filter(|state| **state != SubDeviceState::None).count();
         if self.missing_cycles < MAX_MISSING_CYCLES || (reachable == LEGS && self.data.lost_in_row == 0) {
             return Ok(());

@@ -66,6 +66,8 @@ pub struct LegSection {
     pub product: u32,
     /// Serial number of the drive whose encoder the offset belongs to.
     pub serial: u32,
+    /// Serial number of the drive with which `jog` has found the right direction.
+    pub jogged_serial: Option<u32>,
     /// Station alias, where it is checked.
     pub alias: Option<u16>,
     /// Of the motor's encoder.
@@ -201,6 +203,19 @@ impl DrivesFile {
             (Some(bus), Ok(legs)) if errors.is_empty() => Ok(Self { bus, legs }),
             _ => Err(FileErrors(errors)),
         }
+    }
+
+    /// Legs whose direction has not been checked with their present drive, in words.
+    pub fn unchecked_directions(&self) -> Vec<String> {
+        let unchecked = (1..).zip(&self.legs).filter(|(_, leg)| leg.jogged_serial != Some(leg.serial));
+        unchecked
+            .map(|(number, leg)| {
+                format!(
+                    "leg {number}: its direction was not checked with the drive of serial number {}: jog",
+                    leg.serial
+                )
+            })
+            .collect()
     }
 
     /// Legs, counted from 0, in the order of their drives on the bus.

@@ -63,7 +63,7 @@ fn push<L: Link>(
     let (mut start_m, mut way_m, mut pushed, mut waited) = (None, 0.0f64, 0, 0);
     while pushed < cycles && way_m.abs() < MAX_WAY_M && !is_stopped() {
         match data.next_exchange(bus, devices) {
-            Exchange::Complete => {}
+            Exchange::Complete | Exchange::Early => {}
             Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
             Exchange::Lost if data.lost_in_row > 2 => return Err("frames do not come back".into()),
             Exchange::Lost => continue,

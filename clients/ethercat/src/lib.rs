@@ -10,6 +10,7 @@ pub mod bus;
 pub mod cia402;
 pub mod cycle;
 pub mod drives_file;
+pub mod file_edit;
 pub mod jog;
 pub mod leg_drive;
 pub mod link;

@@ -19,6 +19,8 @@ const WORKING_COUNTER: u16 = 3 * LEGS as u16;
 pub enum Exchange {
     /// All six drives have taken part, in OP.
     Complete,
+    /// The same, but the frame came so soon after SYNC0 that the inputs may be those of the SYNC0 before.
+    Early,
     /// A device is missing or not in OP.
     Incomplete,
     /// No frame came back.
@@ -64,10 +66,13 @@ impl ProcessData {
         }
     }
 
-    /// Waits for the next SYNC0, and exchanges shortly after it.
+    /// Waits until `shift_us` after a SYNC0, and exchanges.
     pub fn next_exchange<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices) -> Exchange {
-        bus.wire.link.sleep_until(self.clock.next_sync0_ns() + self.shift_ns);
-        self.clock.advance_to(bus.wire.link.now_ns());
+        let link = &mut bus.wire.link;
+        link.sleep_until(self.clock.next_sync0_ns() + self.shift_ns);
+        // After a pause of the host the next SYNC0 may have just passed.
+        self.clock.advance_to(link.now_ns());
+        link.sleep_until(self.clock.sync0_ns() + self.shift_ns);
         self.exchange(bus, devices, self.period_ns / 4)
     }
 
@@ -88,8 +93,7 @@ impl ProcessData {
         self.lost_in_row = 0;
         self.sent = self.outputs;
         let frame_ns = wire.sent_ns.midpoint(wire.received_ns);
-        self.clock.advance_to(frame_ns);
-        self.clock.update(frame_ns, response.extra.cycle_start_offset.as_nanos() as u64);
+        let since_sync0_ns = self.clock.update(frame_ns, response.extra.dc_system_time);
         // ethercrab's own summary of the states does not notice a device that is missing.
         self.states = [SubDeviceState::None; LEGS];
         for (state, found) in self.states.iter_mut().zip(&response.subdevice_states) {
@@ -104,7 +108,11 @@ impl ProcessData {
             drive.receive(inputs, frame_ns);
         }
         let all_op = self.states.iter().all(|state| *state == SubDeviceState::Op);
-        if all_op { Exchange::Complete } else { Exchange::Incomplete }
+        match all_op {
+            false => Exchange::Incomplete,
+            true if since_sync0_ns < self.shift_ns / 2 => Exchange::Early,
+            true => Exchange::Complete,
+        }
     }
 
     /// Whether a drive has a fault.

@@ -48,33 +48,3 @@ pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str
     }
     text
 }
-
-/// The text of a file with another offset and serial number of a leg, from 1; the rest stays as it is.
-pub fn with_offset(text: &str, leg: usize, offset_m: f64, serial: u32) -> Option<String> {
-    let start = text.match_indices("[[leg]]").nth(leg.checked_sub(1)?)?.0;
-    let end = text.get(start + 7..)?.find("[[leg]]").map_or(text.len(), |next| start + 7 + next);
-    let (before, section, after) = (text.get(..start)?, text.get(start..end)?, text.get(end..)?);
-    let is_replaced = |line: &str| {
-        let key = line.split('=').next().unwrap_or_default().trim();
-        key == "offset_m" || key == "serial"
-    };
-    let mut lines = section.lines().filter(|line| !is_replaced(line));
-    let first = lines.next()?;
-    let rest: String = lines.map(|line| format!("{line}\n")).collect();
-    Some(format!("{before}{first}\nserial = {serial}\noffset_m = {offset_m:?}\n{rest}{after}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_offset_and_serial_of_the_leg_change() {
-        let text = "a = 1\n[[leg]]\nserial = 1\n[[leg]] # second\nx = 2\noffset_m = 0.5 # old\n\n[[leg]]\nserial = 3\n";
-        let found = with_offset(text, 2, 1.25, 22).unwrap();
-        let expected = "a = 1\n[[leg]]\nserial = 1\n[[leg]] # second\nserial = 22\noffset_m = 1.25\nx = 2\n\n[[leg]]\nserial = 3\n";
-        assert_eq!(found, expected);
-        assert!(with_offset(text, 4, 0.0, 1).is_none());
-        assert!(with_offset(text, 0, 0.0, 1).is_none());
-    }
-}

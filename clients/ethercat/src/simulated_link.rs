@@ -20,6 +20,8 @@ struct Frame {
 
 /// Loss of frames on the simulated cable.
 pub type Loss = Box<dyn FnMut(u64) -> bool>;
+/// Pauses of the host.
+pub type Pauses = Box<dyn FnMut(u64) -> u64>;
 
 /// Simulated interface.
 pub struct SimulatedLink {
@@ -27,6 +29,8 @@ pub struct SimulatedLink {
     pub segment: Segment,
     /// Whether the cable loses a frame sent at an instant \[ns\].
     pub loses: Option<Loss>,
+    /// How much later than at an instant the host wakes up \[ns\].
+    pub pauses: Option<Pauses>,
     now_ns: u64,
     frames: VecDeque<Frame>,
 }
@@ -35,7 +39,13 @@ impl SimulatedLink {
     /// A cable to a segment. The clock of this thread's timers is the simulated one from now on.
     pub fn new(segment: Segment, now_ns: u64) -> Self {
         timer::simulate(now_ns);
-        Self { segment, loses: None, now_ns, frames: VecDeque::with_capacity(MAX_FRAMES) }
+        Self { segment, loses: None, pauses: None, now_ns, frames: VecDeque::with_capacity(MAX_FRAMES) }
+    }
+
+    /// Waits until an instant, or for as much longer as the host pauses.
+    fn wait_until(&mut self, until_ns: u64) {
+        let pause_ns = self.pauses.as_mut().map_or(0, |pauses| pauses(until_ns));
+        self.advance_to(until_ns + pause_ns);
     }
 
     /// Simulates until an instant, with the frames that pass until then.
@@ -95,10 +105,10 @@ impl Link for SimulatedLink {
 
     fn wait_for_frame(&mut self, until_ns: u64) {
         let back_ns = self.frames.front().map_or(u64::MAX, |frame| frame.sent_ns + 2 * ONE_WAY_NS);
-        self.advance_to(back_ns.min(until_ns));
+        self.wait_until(back_ns.min(until_ns));
     }
 
     fn sleep_until(&mut self, until_ns: u64) {
-        self.advance_to(until_ns);
+        self.wait_until(until_ns.max(self.now_ns));
     }
 }

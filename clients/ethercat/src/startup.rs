@@ -363,7 +363,7 @@ fn reach_op<L: Link>(
         let exchanged = wire.run_until(devices.tx_rx_dc(main), wake_ns + period_ns / 2);
         if let Some(Ok(response)) = exchanged {
             let frame_ns = wire.sent_ns.midpoint(wire.received_ns);
-            clock.update(frame_ns, response.extra.cycle_start_offset.as_nanos() as u64);
+            clock.update(frame_ns, response.extra.dc_system_time);
             if response.subdevice_states.iter().all(|state| *state == ethercrab::SubDeviceState::Op) {
                 return Ok(clock);
             }

@@ -12,11 +12,14 @@ const RATE_GAIN: f64 = PHASE_GAIN * PHASE_GAIN / 4.0;
 /// Largest deviation that counts, once started \[ns\]: a larger one is a frame that the host delayed.
 const MAX_DEVIATION_NS: f64 = 10_000.0;
 
-/// Filtered instants of SYNC0.
+/// Filtered instants of SYNC0. Each pulse has a number, the system time of the segment in periods: a frame whose response the
+/// host delays by periods still belongs to the right pulse.
 #[derive(Clone, Copy, Debug)]
 pub struct SyncClock {
-    period_ns: f64,
-    /// Whole nanoseconds, and the rest.
+    period_ns: u64,
+    /// Number of the latest pulse.
+    number: u64,
+    /// Its instant: whole nanoseconds, and the rest.
     sync0_ns: u64,
     fraction_ns: f64,
     /// Deviation of the period, as a share.
@@ -27,7 +30,7 @@ pub struct SyncClock {
 impl SyncClock {
     /// A grid that is not yet known.
     pub fn new(period_ns: u64, now_ns: u64) -> Self {
-        Self { period_ns: period_ns as f64, sync0_ns: now_ns, fraction_ns: 0.0, rate: 0.0, exchanges: 0 }
+        Self { period_ns, number: 0, sync0_ns: now_ns, fraction_ns: 0.0, rate: 0.0, exchanges: 0 }
     }
 
     /// The latest SYNC0 of the grid \[ns\].
@@ -37,14 +40,19 @@ impl SyncClock {
 
     /// The SYNC0 after it \[ns\].
     pub fn next_sync0_ns(&self) -> u64 {
-        self.sync0_ns.saturating_add((self.fraction_ns + self.period_ns * (1.0 + self.rate)) as u64)
+        self.sync0_ns.saturating_add((self.fraction_ns + self.actual_period_ns()) as u64)
+    }
+
+    fn actual_period_ns(&self) -> f64 {
+        self.period_ns as f64 * (1.0 + self.rate)
     }
 
     /// Goes on to the latest SYNC0 that is not after an instant.
     pub fn advance_to(&mut self, now_ns: u64) {
-        let period_ns = self.period_ns * (1.0 + self.rate);
         let passed_ns = now_ns.saturating_sub(self.sync0_ns) as f64 - self.fraction_ns;
-        self.add((passed_ns / period_ns).floor().max(0.0) * period_ns);
+        let periods = (passed_ns / self.actual_period_ns()).floor().max(0.0);
+        self.number += periods as u64;
+        self.add(periods * self.actual_period_ns());
     }
 
     fn add(&mut self, step_ns: f64) {
@@ -54,19 +62,28 @@ impl SyncClock {
         self.fraction_ns = sum_ns - whole_ns;
     }
 
-    /// Takes in that a frame was at the reference clock at an instant, so long after SYNC0 \[ns\].
-    pub fn update(&mut self, frame_ns: u64, since_sync0_ns: u64) {
-        let measured_ns = frame_ns.saturating_sub(since_sync0_ns);
-        let difference_ns = measured_ns.wrapping_sub(self.sync0_ns) as i64 as f64 - self.fraction_ns;
-        let deviation_ns = difference_ns - (difference_ns / self.period_ns).round() * self.period_ns;
+    /// Takes in that a frame was at the reference clock at about an instant, when this clock showed `system_ns`, and goes to the
+    /// SYNC0 before that; the time since \[ns\].
+    pub fn update(&mut self, frame_ns: u64, system_ns: u64) -> u64 {
+        let (number, since_ns) = (system_ns / self.period_ns, system_ns % self.period_ns);
+        let measured_ns = frame_ns.saturating_sub(since_ns);
         self.exchanges = self.exchanges.saturating_add(1);
-        if self.exchanges <= STARTING_EXCHANGES {
-            self.add(deviation_ns / f64::from(self.exchanges));
+        if self.exchanges == 1 {
+            (self.sync0_ns, self.fraction_ns) = (measured_ns, 0.0);
         } else {
-            let counted_ns = deviation_ns.clamp(-MAX_DEVIATION_NS, MAX_DEVIATION_NS);
-            self.add(counted_ns * PHASE_GAIN);
-            self.rate += counted_ns * RATE_GAIN / self.period_ns;
+            let periods = number.wrapping_sub(self.number) as i64;
+            self.add(periods as f64 * self.actual_period_ns());
+            let deviation_ns = measured_ns.wrapping_sub(self.sync0_ns) as i64 as f64 - self.fraction_ns;
+            if self.exchanges <= STARTING_EXCHANGES {
+                self.add(deviation_ns / f64::from(self.exchanges));
+            } else {
+                let counted_ns = deviation_ns.clamp(-MAX_DEVIATION_NS, MAX_DEVIATION_NS);
+                self.add(counted_ns * PHASE_GAIN);
+                self.rate += counted_ns * RATE_GAIN / self.period_ns as f64;
+            }
         }
+        self.number = number;
+        since_ns
     }
 }
 
@@ -74,8 +91,9 @@ impl SyncClock {
 mod tests {
     use super::*;
 
-    /// Error of the grid at the end \[ns\], for a reference clock that is fast by `ppm`, and frames late by up to `jitter_ns`.
-    fn error_ns(ppm: f64, jitter_ns: u64, is_late: fn(u64) -> bool) -> f64 {
+    /// Largest error of the grid \[ns\], for a reference clock that is fast by `ppm`, and frames whose responses are late by up to
+    /// `jitter_ns`, and by `late_ns` in each hundredth cycle.
+    fn error_ns(ppm: f64, jitter_ns: u64, late_ns: u64) -> f64 {
         let period_ns = 1_000_000.0 / (1.0 + ppm * 1e-6);
         let start_ns = 1_000_000_000_000u64;
         let mut clock = SyncClock::new(1_000_000, start_ns);
@@ -84,10 +102,10 @@ mod tests {
             let sync0_ns = start_ns as f64 + 345_678.0 + cycle as f64 * period_ns;
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             let jitter_ns = (random >> 33) % (jitter_ns + 1);
-            let since_ns = 100_000;
-            clock.advance_to(sync0_ns as u64 + since_ns);
-            let late_ns = if is_late(cycle) { 400_000 } else { 0 };
-            clock.update(sync0_ns as u64 + since_ns + jitter_ns + late_ns, since_ns);
+            let late_ns = if cycle % 100 == 0 { late_ns } else { 0 };
+            let frame_ns = sync0_ns as u64 + 100_000 + jitter_ns + late_ns;
+            let since_ns = clock.update(frame_ns, (7_000 + cycle) * 1_000_000 + 100_000);
+            assert_eq!(since_ns, 100_000);
             if cycle > 10_000 {
                 error = error.max((clock.sync0_ns() as f64 - sync0_ns - jitter_ns as f64 / 2.0).abs());
             }
@@ -98,15 +116,17 @@ mod tests {
     #[test]
     fn the_grid_follows_a_clock_that_is_fast_or_slow() {
         for ppm in [-50.0, 0.0, 50.0] {
-            let error = error_ns(ppm, 0, |_| false);
+            let error = error_ns(ppm, 0, 0);
             assert!(error < 100.0, "{ppm} ppm: {error} ns");
         }
     }
 
     #[test]
-    fn jitter_is_filtered_and_late_frames_hardly_count() {
-        let error = error_ns(20.0, 10_000, |cycle| cycle % 100 == 0);
-        assert!(error < 7_000.0, "{error} ns");
+    fn jitter_is_filtered_and_late_responses_hardly_count() {
+        for late_ns in [400_000, 1_700_000, 30_000_000] {
+            let error = error_ns(20.0, 10_000, late_ns);
+            assert!(error < 7_000.0, "{late_ns}: {error} ns");
+        }
     }
 
     #[test]

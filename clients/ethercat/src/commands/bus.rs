@@ -10,12 +10,15 @@ use hexad_ethercat::drives_file::{DrivesFile, LegSection, SdoWrite};
 use hexad_ethercat::process_data::{Exchange, ProcessData};
 use hexad_ethercat::raw_socket::RawSocket;
 use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
-use hexad_ethercat::{jog as jogging, machine_check, objects, scan as scanning};
+use hexad_ethercat::{file_edit, jog as jogging, machine_check, objects, scan as scanning};
 
 use super::{Failure, after_start, before_start, load_drives, load_machine, load_text, none_of, open};
 
 /// Cycles for which faults are acknowledged, after as many without.
 const RESET_CYCLES: u32 = 100;
+
+/// A leg that moves by less does not show its direction \[m\].
+const MIN_WAY_M: f64 = 5e-5;
 
 pub fn scan(interface: &str, name: &str) -> Result<(), Failure> {
     let frames = Frames::new();
@@ -28,7 +31,8 @@ pub fn scan(interface: &str, name: &str) -> Result<(), Failure> {
 pub fn check(drives: &Path, machine: Option<&Path>, is_offline: bool) -> Result<(), Failure> {
     let file = load_drives(drives)?;
     let machine = machine.map(load_machine).transpose()?;
-    let mut errors = machine.map_or(vec![], |machine| machine_check::contradictions(&file, &machine));
+    let mut errors = file.unchecked_directions();
+    errors.extend(machine.map_or(vec![], |machine| machine_check::contradictions(&file, &machine)));
     if !is_offline {
         let frames = Frames::new();
         let (mut bus, devices) = pre_op(&frames, &file)?;
@@ -85,8 +89,14 @@ pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: 
     let found = jogging::jog(&mut bus, &devices, &mut data, leg - 1, force_n, cycles, || stop.is_requested());
     leave(bus, devices);
     let jogging::Jog { way_m, is_direction_right } = found.map_err(after_start)?;
+    if way_m.abs() < MIN_WAY_M {
+        return Err(after_start(format!(
+            "leg {leg}: it did not move: is its brake open? Try more --permille"
+        )));
+    }
     let (way_mm, word) = (way_m * 1e3, if way_m > 0.0 { "longer" } else { "shorter" });
     println!("leg {leg}: by its encoder it is {:.3} mm {word}; look whether it is", way_mm.abs());
+    edit(drives, leg, &[("jogged_serial", is_direction_right.then(|| section.serial.to_string()))])?;
     if is_direction_right {
         println!("leg {leg}: if it is not, `sign` is wrong");
         return Ok(());
@@ -97,6 +107,13 @@ pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: 
     )))
 }
 
+/// Changes values of a leg in the file.
+fn edit(drives: &Path, leg: usize, values: &[(&str, Option<String>)]) -> Result<(), Failure> {
+    let text = file_edit::with_values(&load_text(drives)?, leg, values)
+        .ok_or_else(|| after_start(format!("{}: has no section of leg {leg}", drives.display())))?;
+    fs::write(drives, text).map_err(|error| after_start(format!("{}: {error}", drives.display())))
+}
+
 /// Returns the devices to SAFE-OP, so that no watchdog trips.
 pub(super) fn leave(mut bus: Bus<RawSocket>, devices: OpDevices) {
     // Devices that do not follow trip their watchdog: the drives stop as well.
@@ -104,7 +121,7 @@ pub(super) fn leave(mut bus: Bus<RawSocket>, devices: OpDevices) {
 }
 
 pub fn zero(drives: &Path, leg: usize, length_m: f64) -> Result<(), Failure> {
-    let (text, file) = (load_text(drives)?, load_drives(drives)?);
+    let file = load_drives(drives)?;
     let section = leg_section(&file, leg)?;
     let frames = Frames::new();
     let (mut bus, devices) = pre_op(&frames, &file)?;
@@ -113,9 +130,8 @@ pub fn zero(drives: &Path, leg: usize, length_m: f64) -> Result<(), Failure> {
     let identity = found.get(position).ok_or_else(|| before_start(format!("leg {leg}: no device")))?;
     let counts = bus.sdo_value(&devices, position, objects::POSITION, 0).map_err(after_start)?;
     let offset_m = length_m - counts as f64 * section.units().metres_per_count();
-    let text = scanning::with_offset(&text, leg, offset_m, identity.serial)
-        .ok_or_else(|| after_start(format!("{}: has no section of leg {leg}", drives.display())))?;
-    fs::write(drives, text).map_err(|error| after_start(format!("{}: {error}", drives.display())))?;
+    let values = [("serial", Some(identity.serial.to_string())), ("offset_m", Some(format!("{offset_m:?}")))];
+    edit(drives, leg, &values)?;
     println!("leg {leg}: offset_m = {offset_m:?} with the drive of serial number {}", identity.serial);
     Ok(())
 }
@@ -129,7 +145,7 @@ pub fn reset(drives: &Path) -> Result<(), Failure> {
         for (drive, outputs) in data.drives.iter_mut().zip(&mut data.outputs) {
             *outputs = drive.command(goal, 0.0);
         }
-        if data.next_exchange(&mut bus, &devices) != Exchange::Complete {
+        if data.next_exchange(&mut bus, &devices) == Exchange::Incomplete {
             return Err(after_start("a drive is missing or has left OP"));
         }
     }

@@ -17,12 +17,14 @@ use super::{Failure, after_start, before_start, load_drives, load_machine, none_
 
 /// Below the daemon's priorities, 80 and 79.
 const PRIORITY: i32 = 70;
+/// Exchanges within which one must be complete.
+const FIRST_EXCHANGES: u32 = 10;
 /// Cycles in which the drives stop at the end: a quick stop, and the brakes.
 const END_CYCLES: u32 = 500;
 
 pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
     let (file, machine) = (load_drives(drives)?, load_machine(machine)?);
-    none_of(machine_check::contradictions(&file, &machine))?;
+    none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
     let stop = Stop::on_signals().map_err(before_start)?;
     let topics = Topics::join(&machine.name).map_err(before_start)?;
     memory::keep_heap();
@@ -34,8 +36,8 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
     let actuator = &machine.machine.actuator;
     let middle_m = actuator.min_length.midpoint(actuator.max_length);
     let (mut bus, devices, mut data) = operational(&frames, &file, middle_m)?;
-    // The first inputs.
-    if data.next_exchange(&mut bus, &devices) != Exchange::Complete {
+    // The first inputs; the host may lose a frame.
+    if (0..FIRST_EXCHANGES).all(|_| data.next_exchange(&mut bus, &devices) != Exchange::Complete) {
         return Err(before_start("a drive is missing or has left OP"));
     }
     none_of(machine_check::lengths_outside(data.drives.map(|drive| drive.length_m()), &machine))?;

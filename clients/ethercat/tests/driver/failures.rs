@@ -142,6 +142,26 @@ fn single_lost_frames_change_nothing() {
     assert!(rig.driver.data.lost_frames > 200 && counts.stops == 0, "{counts:?}");
 }
 
+/// The driver may be paused between sending a frame and receiving it: the inputs belong to another SYNC0 than the clock of the
+/// computer suggests.
+#[test]
+fn pauses_of_the_host_give_no_measurement_a_wrong_stamp() {
+    let frames = Frames::new();
+    let mut rig = moving(&frames);
+    let mut random = 1u64;
+    rig.bus.wire.link.pauses = Some(Box::new(move |_| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        let is_paused = (random >> 33).is_multiple_of(300);
+        if is_paused { (random >> 40) % 3_000_000 } else { 0 }
+    }));
+    for _ in 0..6000 {
+        let cycles = rig.driver.data.lost_frames;
+        rig.cycles(1);
+        assert_eq!(rig.state(), State::Active, "{:?} {cycles}", rig.driver.daemon.output.diagnostic);
+    }
+    assert!(rig.driver.counts.unanswered + rig.driver.counts.late > 20, "{:?}", rig.driver.counts);
+}
+
 #[test]
 fn frames_lost_in_a_row_stop_all_and_the_bus_recovers() {
     let frames = Frames::new();

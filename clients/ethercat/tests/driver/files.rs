@@ -11,10 +11,10 @@ use super::common::*;
 fn all_errors_of_a_file_are_reported_at_once() {
     let text = DRIVES
         .replace("interface = \"ec0\"", "interface = \"ec0\"\nperiod_us = 20\nanswer_us = 5000")
-        .replace("serial = 103\nsign = -1", "serial = 103\nsign = 2\nlead_m = 7.0")
-        .replace("serial = 104", "serial = \"x\"")
-        .replace("serial = 105", "serial = 105\nposition = 1")
-        .replace("serial = 106", "serial = 106\ncolour = 1");
+        .replace("sign = -1", "sign = 2\nlead_m = 7.0")
+        .replace("\nserial = 104", "\nserial = \"x\"")
+        .replace("\nserial = 105", "\nserial = 105\nposition = 1")
+        .replace("\nserial = 106", "\nserial = 106\ncolour = 1");
     let errors = DrivesFile::parse(&text, "my.toml").unwrap_err().to_string();
     for expected in [
         "my.toml: period_us = 20: must be in [250, 10000]",
@@ -100,4 +100,16 @@ fn a_machine_file_that_disagrees_is_refused() {
     let errors = machine_check::lengths_outside(lengths, &machine());
     assert_eq!(errors.len(), 2, "{errors:?}");
     assert!(errors[0].starts_with("leg 2: length 1.0900 m is outside of the stroke [1.1, 2.3] m: measure"));
+}
+
+#[test]
+fn a_direction_counts_for_the_drive_with_which_it_was_checked() {
+    assert_eq!(drives().unchecked_directions(), [""; 0]);
+    let text =
+        DRIVES.replace("jogged_serial = 102\n", "").replace("jogged_serial = 105", "jogged_serial = 104");
+    let errors = DrivesFile::parse(&text, "edited").unwrap().unchecked_directions();
+    let expected = [2, 5].map(|leg| {
+        format!("leg {leg}: its direction was not checked with the drive of serial number {}: jog", 100 + leg)
+    });
+    assert_eq!(errors, expected);
 }

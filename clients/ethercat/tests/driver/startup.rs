@@ -68,8 +68,8 @@ const ROWS: &[Row] = &[
     (
         "another drive",
         |_| {},
-        "serial = 105",
-        "serial = 205",
+        "\nserial = 105",
+        "\nserial = 205",
         &["leg 5: drive with serial number 105 instead of 205: measure its offset again"],
     ),
     (

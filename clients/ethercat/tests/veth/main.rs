@@ -1,0 +1,150 @@
+//! The commands over a veth pair, with the real daemon and with SOEM. Needs root and `ip`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod network;
+#[path = "../../../../tests/common/not_run.rs"]
+#[allow(dead_code, reason = "shared with the tests of hexad")]
+mod not_run;
+#[path = "../../../../tests/common/python.rs"]
+mod python;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+use std::thread::sleep;
+use std::time::Duration;
+use std::{env, fs};
+
+use network::Network;
+
+const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
+
+/// One loop at a time: they are real-time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn driver() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_hexad-ethercat"))
+}
+
+/// The command `hexad`, of the same build.
+fn hexad() -> PathBuf {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--quiet", "-p", "hexad", "--bin", "hexad"]).current_dir(env!("CARGO_MANIFEST_DIR"));
+    assert!(cargo.status().unwrap().success());
+    driver().with_file_name("hexad")
+}
+
+/// A network with the files of a machine of its own, and the simulated drives at one end of its cable.
+fn simulated(test: &str, options: &str) -> Option<Network> {
+    let mut network = match Network::new(test) {
+        Ok(network) => network,
+        Err(why) => {
+            not_run::lacking(&format!("a network namespace (root, ip): {why}"));
+            return None;
+        }
+    };
+    let machine =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/motion_base.toml")).unwrap();
+    let name = format!("\"{}\"", network.machine());
+    let sections = "\n[realtime]\nrelease = \"external\"\n[drive]\ndelay_us = 1000.0\n";
+    fs::write(network.path("m.toml"), machine.replace("\"motion_base\"", &name) + sections).unwrap();
+    fs::write(network.path("d.toml"), DRIVES.replace("\"motion_base\"", &name)).unwrap();
+    network.start("simulate", driver(), &format!("simulate d.toml m.toml --interface ec1{options}"));
+    network.wait_for("simulate", "switched on", 1);
+    Some(network)
+}
+
+#[test]
+fn the_daemon_drives_the_platform_over_the_bus() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let hexad = hexad();
+    let Some(mut network) = simulated("run", "") else { return };
+    assert!(network.output(driver(), "check d.toml --machine m.toml").contains("no error"));
+    network.start("daemon", &hexad, "run m.toml");
+    network.start("run", driver(), "run d.toml m.toml");
+    network.wait_for("run", "six drives in OP", 1);
+    let seconds = if env::var_os("HEXAD_LONG").is_some() { 600 } else { 6 };
+    for motion in ["sines", "minimum-jerk"] {
+        let text = network.output(
+            &hexad,
+            &format!("move --config m.toml --motion {motion} --seconds {} --engage", seconds / 2),
+        );
+        println!("{motion}: {text}");
+    }
+    let log = network.log("daemon");
+    assert!(!log.contains("fault"), "{log}");
+    // Killed in motion: the watchdogs of the drives close the brakes.
+    let motion = "move --config m.toml --motion sines --seconds 60 --engage";
+    network.start("move", &hexad, motion);
+    network.wait_for("move", "in control: moving", 1);
+    sleep(Duration::from_secs(2));
+    network.signal("run", libc::SIGKILL);
+    network.wait_for("simulate", "al_status=20 drive=Fault is_brake_open=false", 6);
+    network.wait_for("daemon", "code=101", 1);
+    // The same bus, started again; an operator clears the daemon's fault, and the drives' with it.
+    network.start("run", driver(), "run d.toml m.toml");
+    network.wait_for("run", "six drives in OP", 1);
+    network.wait_for("run", "leg 6 has the fault 0x7500", 1);
+    network.output(&hexad, "clear --config m.toml");
+    network.wait_for("run", "faults of drives are acknowledged", 1);
+    network.signal("move", libc::SIGINT);
+    sleep(Duration::from_millis(500));
+    network.output(&hexad, "goto --config m.toml --home --engage");
+    network.start("move", &hexad, motion);
+    network.wait_for("move", "in control: moving", 1);
+    sleep(Duration::from_secs(1));
+    // The daemon is killed: the forces expire.
+    let stops = network.log("simulate").matches("drive=QuickStop").count();
+    network.signal("daemon", libc::SIGKILL);
+    network.wait_for("simulate", "drive=QuickStop", stops + 6);
+    network.signal("run", libc::SIGINT);
+    network.wait_for("run", "the driver ends", 1);
+    println!("{}", network.log("run"));
+}
+
+#[test]
+fn commands_that_use_the_bus_for_a_moment() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(network) = simulated("jog", " --uncoupled") else { return };
+    let output = |arguments: &str| network.output(driver(), arguments);
+    let refused = |arguments: &str| {
+        let ended = network.command(driver(), arguments).output().unwrap();
+        assert!(!ended.status.success(), "{arguments}");
+        String::from_utf8_lossy(&ended.stderr).into_owned()
+    };
+    assert!(output("scan ec0").contains("serial = 106"));
+    assert_eq!(output("read d.toml 3 0x6076:0").trim(), "0x6076:0 = 24000 (0x5dc0)");
+    output("write d.toml 3 0x605a:0 6");
+    assert_eq!(output("read d.toml 3 0x605a").trim(), "0x605a:0 = 6 (0x6)");
+    assert!(refused("jog d.toml 3").contains("confirm with --unloaded"));
+    let file = fs::read_to_string(network.path("d.toml")).unwrap();
+    fs::write(network.path("d.toml"), file.replace("jogged_serial = 103\n", "")).unwrap();
+    assert!(refused("check d.toml").contains("leg 3: its direction was not checked"));
+    let text = output("jog d.toml 3 --unloaded");
+    assert!(text.contains("mm longer; look whether it is"), "{text}");
+    output("check d.toml");
+    // Another offset is written with the serial number of the drive.
+    output("zero d.toml 3 --length-m 1.75");
+    let file = fs::read_to_string(network.path("d.toml")).unwrap();
+    let leg = file.split("[[leg]]").nth(3).unwrap();
+    assert!(leg.contains("serial = 103") && leg.contains("offset_m = "), "{leg}");
+    output("reset d.toml");
+    assert!(refused("scan ec7").contains("interface ec7 does not exist"));
+    assert!(refused("scan lo").contains("no carrier"), "lo is down");
+    let mut busy = network.command(driver(), "simulate d.toml m.toml --interface ec1");
+    let text = String::from_utf8_lossy(&busy.output().unwrap().stderr).into_owned();
+    assert!(text.contains("another hexad-ethercat uses ec1"), "{text}");
+}
+
+#[test]
+fn soem_brings_the_drives_to_op() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let environment = match python::environment(&["pysoem==1.1.13".into()]) {
+        Ok(environment) => environment,
+        Err(why) => return not_run::lacking(&why),
+    };
+    let Some(network) = simulated("soem", "") else { return };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/veth/soem.py");
+    let text = network.output(&environment.join("bin/python"), &format!("{script} ec0"));
+    assert!(text.contains("working counter 18 of 18 enabled 6"), "{text}");
+}
