@@ -17,7 +17,7 @@ use crate::drives_file::{BusSection, OnBrake};
 use crate::link::Link;
 use crate::permission::Permission;
 use crate::process_data::{Exchange, ProcessData};
-use crate::segment::device::al_state;
+use crate::segment::application_layer::al_state;
 use crate::startup::{FIRST_ADDRESS, OpDevices};
 
 /// Interval at which the driver looks for the forces \[ns\].

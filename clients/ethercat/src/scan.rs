@@ -3,9 +3,10 @@
 use std::fmt::Write;
 
 use crate::bus::Bus;
+use crate::inventory::identities;
 use crate::link::Link;
 use crate::objects;
-use crate::startup::{PreOpDevices, identities};
+use crate::startup::PreOpDevices;
 
 /// Text of the file. Lines that only the user can complete are comments with `?`.
 pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str, interface: &str) -> String {

@@ -10,7 +10,7 @@ use hexad_ethercat::drives_file::{DrivesFile, LegSection, SdoWrite};
 use hexad_ethercat::process_data::{Exchange, ProcessData};
 use hexad_ethercat::raw_socket::RawSocket;
 use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
-use hexad_ethercat::{file_edit, jog as jogging, machine_check, objects, scan as scanning};
+use hexad_ethercat::{file_edit, inventory, jog as jogging, machine_check, objects, scan as scanning};
 
 use super::{Failure, after_start, before_start, load_drives, load_machine, load_text, none_of, open};
 
@@ -36,7 +36,7 @@ pub fn check(drives: &Path, machine: Option<&Path>, is_offline: bool) -> Result<
     if !is_offline {
         let frames = Frames::new();
         let (mut bus, devices) = pre_op(&frames, &file)?;
-        errors.extend(startup::contradictions(&mut bus, &devices, &file));
+        errors.extend(inventory::contradictions(&mut bus, &devices, &file));
     }
     none_of(errors)?;
     println!("{}: no error", drives.display());
@@ -61,7 +61,7 @@ pub(super) fn operational<'f>(
     middle_m: f64,
 ) -> Result<(Bus<'f, RawSocket>, OpDevices, ProcessData), Failure> {
     let (mut bus, devices) = pre_op(frames, file)?;
-    none_of(startup::contradictions(&mut bus, &devices, file))?;
+    none_of(inventory::contradictions(&mut bus, &devices, file))?;
     let (devices, clock) = startup::bring_up(&mut bus, devices, file).map_err(before_start)?;
     Ok((bus, devices, ProcessData::new(file, middle_m, clock)))
 }
@@ -126,7 +126,7 @@ pub fn zero(drives: &Path, leg: usize, length_m: f64) -> Result<(), Failure> {
     let frames = Frames::new();
     let (mut bus, devices) = pre_op(&frames, &file)?;
     let position = section.position - 1;
-    let found = startup::identities(&mut bus, &devices);
+    let found = inventory::identities(&mut bus, &devices);
     let identity = found.get(position).ok_or_else(|| before_start(format!("leg {leg}: no device")))?;
     let counts = bus.sdo_value(&devices, position, objects::POSITION, 0).map_err(after_start)?;
     let offset_m = length_m - counts as f64 * section.units().metres_per_count();

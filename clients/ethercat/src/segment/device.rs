@@ -1,32 +1,16 @@
-//! One simulated device: its EtherCAT controller (registers, sync managers, FMMUs, states of the application layer, watchdog,
-//! mailbox, distributed clock), and the drive behind it. ETG1000.4, and the data sheet of the ET1100.
+//! One simulated device: its EtherCAT controller (registers, sync managers, distributed clock), and the drive behind it. ETG1000.4, and the data sheet of the ET1100.
 
+use super::application_layer::al_state::{INIT, OP, SAFE_OP};
 use super::local_clock::LocalClock;
 use super::object_dictionary::{MappedObject, ObjectDictionary};
 use super::servo_drive::{DriveCommand, ServoDrive};
-use super::sii::{self, Identity, MAILBOX_LENGTH, SYNC_MANAGER_STARTS};
-use crate::cia402::DriveState;
+use super::sii::{self, Identity};
 use crate::objects;
 use crate::units::LegUnits;
 
-const MEMORY: usize = 0x2000;
+pub(super) const MEMORY: usize = 0x2000;
 /// Period of the firmware while there is no SYNC0 \[ns\].
 const FREE_RUN_NS: u64 = 1_000_000;
-
-/// State of the application layer, as in the registers 0x0120 and 0x0130.
-pub mod al_state {
-    /// Registers only.
-    pub const INIT: u8 = 1;
-    /// Mailbox.
-    pub const PRE_OP: u8 = 2;
-    /// Inputs.
-    pub const SAFE_OP: u8 = 4;
-    /// Inputs and outputs.
-    pub const OP: u8 = 8;
-    /// The last change was refused, or the device left its state; register 0x0134 has the code.
-    pub const ERROR: u8 = 0x10;
-}
-use al_state::{ERROR, INIT, OP, PRE_OP, SAFE_OP};
 
 /// Description of a simulated device.
 #[derive(Clone, Copy, Debug)]
@@ -60,13 +44,13 @@ pub struct Device {
     pub emergency: Option<u16>,
     pub(super) memory: Box<[u8; MEMORY]>,
     /// Response that waits until the mailbox has been read.
-    waiting_response: Option<Vec<u8>>,
+    pub(super) waiting_response: Option<Vec<u8>>,
     sii: Vec<u8>,
     pub(super) clock: LocalClock,
-    outputs: Vec<MappedObject>,
-    inputs: Vec<MappedObject>,
-    outputs_ns: Option<u64>,
-    is_op_requested: bool,
+    pub(super) outputs: Vec<MappedObject>,
+    pub(super) inputs: Vec<MappedObject>,
+    pub(super) outputs_ns: Option<u64>,
+    pub(super) is_op_requested: bool,
     /// System time of the next SYNC0.
     next_sync0_ns: Option<u64>,
     next_free_run_ns: u64,
@@ -141,60 +125,9 @@ impl Device {
     }
 
     /// Start, length and activation of a sync manager.
-    fn sync_manager(&self, number: usize) -> (usize, usize, bool) {
+    pub(super) fn sync_manager(&self, number: usize) -> (usize, usize, bool) {
         let register = 0x800 + 8 * number;
         (self.u16_at(register).into(), self.u16_at(register + 2).into(), self.memory[register + 6] & 1 == 1)
-    }
-
-    fn refuse(&mut self, code: u16) {
-        self.memory[0x130] |= ERROR;
-        self.put(0x134, &code.to_le_bytes());
-    }
-
-    fn request_state(&mut self) {
-        let request = self.memory[0x120] & 0xf;
-        if self.memory[0x120] & ERROR != 0 {
-            self.memory[0x130] &= 0xf;
-            self.put(0x134, &[0; 2]);
-        }
-        let state = self.memory[0x130] & 0xf;
-        if self.memory[0x130] & ERROR != 0 && request > state {
-            return;
-        }
-        if let Some((_, code)) = self.refusal.filter(|refusal| refusal.0 == request) {
-            return self.refuse(code);
-        }
-        self.is_op_requested = false;
-        match (state, request) {
-            (_, INIT) => self.memory[0x130] = INIT,
-            (INIT, PRE_OP) => {
-                let [receive, send, ..] = SYNC_MANAGER_STARTS;
-                let expected = [receive, send].map(|start| (start.into(), MAILBOX_LENGTH.into(), true));
-                if [self.sync_manager(0), self.sync_manager(1)] == expected {
-                    self.memory[0x130] = PRE_OP;
-                } else {
-                    self.refuse(0x16);
-                }
-            }
-            (PRE_OP, SAFE_OP) => self.check_process_data(),
-            (SAFE_OP, OP) => (self.is_op_requested, self.outputs_ns) = (true, None),
-            (PRE_OP, PRE_OP) | (SAFE_OP | OP, PRE_OP | SAFE_OP) | (OP, OP) => self.memory[0x130] = request,
-            _ => self.refuse(0x11),
-        }
-    }
-
-    fn check_process_data(&mut self) {
-        self.outputs = self.objects.process_data(objects::RX_PDO_ASSIGNMENT);
-        self.inputs = self.objects.process_data(objects::TX_PDO_ASSIGNMENT);
-        let bytes = |map: &[MappedObject]| map.iter().map(|object| object.bytes).sum::<usize>();
-        let is_as_mapped = |manager: (usize, usize, bool), map| manager.1 == bytes(map) && manager.2;
-        if !is_as_mapped(self.sync_manager(2), &self.outputs) {
-            self.refuse(0x1d);
-        } else if !is_as_mapped(self.sync_manager(3), &self.inputs) {
-            self.refuse(0x1e);
-        } else {
-            self.memory[0x130] = SAFE_OP;
-        }
     }
 
     /// The bus reads memory; whether the device takes part.
@@ -317,34 +250,6 @@ impl Device {
         self.memory[0x503] = 0;
     }
 
-    fn receive_mailbox(&mut self) {
-        let (start, length, _) = self.sync_manager(0);
-        let is_pre_op = self.memory[0x130] & 0xf == PRE_OP;
-        let response = self.objects.respond(&self.memory[start..start + length], is_pre_op);
-        let has_emergency = self.send_emergency();
-        match response {
-            Some(response) if !has_emergency => self.fill_mailbox(&response),
-            response => self.waiting_response = response,
-        }
-    }
-
-    /// Puts the emergency into the mailbox, if there is one.
-    fn send_emergency(&mut self) -> bool {
-        let Some(code) = self.emergency.take_if(|_| self.memory[0x80d] & 8 == 0) else { return false };
-        let [low, high] = code.to_le_bytes();
-        self.fill_mailbox(&[0, 0, 0, 0, 0, 3, 0, 0x10, low, high, 0x81, 0, 0, 0, 0, 0]);
-        true
-    }
-
-    fn fill_mailbox(&mut self, message: &[u8]) {
-        let (start, length, _) = self.sync_manager(1);
-        let length = length.min(MEMORY - start);
-        self.memory[start..start + length].fill(0);
-        self.put(start, &message[..message.len().min(length)]);
-        self.put(start, &(message.len() as u16 - 6).to_le_bytes());
-        self.memory[0x80d] |= 8;
-    }
-
     /// Instant of the next cycle of the firmware \[ns\].
     pub fn due_ns(&self, now_ns: u64) -> u64 {
         self.next_sync0_ns.map_or(self.next_free_run_ns, |sync0_ns| self.clock.instant_of(sync0_ns, now_ns))
@@ -376,26 +281,6 @@ impl Device {
         self.latch_inputs(length_m);
         if is_op {
             self.send_emergency();
-        }
-    }
-
-    /// Time of the watchdog of the outputs \[ns\]; 0 without one.
-    pub fn watchdog_ns(&self) -> u64 {
-        (u64::from(self.u16_at(0x400)) + 2) * 40 * u64::from(self.u16_at(0x420))
-    }
-
-    /// The outputs have not been written for the time of the watchdog of sync manager 2.
-    fn check_watchdog(&mut self, now_ns: u64) {
-        let watchdog_ns = self.watchdog_ns();
-        let age_ns = now_ns.saturating_sub(self.outputs_ns.unwrap_or(now_ns));
-        if self.memory[0x130] == OP && watchdog_ns > 0 && age_ns > watchdog_ns {
-            self.memory[0x130] = SAFE_OP;
-            self.refuse(0x1b);
-            self.memory[0x440] = 0;
-            self.outputs_ns = None;
-            if self.drive.state != DriveState::SwitchOnDisabled {
-                self.drive.trip(0x7500);
-            }
         }
     }
 

@@ -5,8 +5,10 @@
     reason = "a simulator: addresses are within a memory of fixed size, or checked before"
 )]
 
+pub mod application_layer;
 pub mod device;
 pub mod local_clock;
+mod mailbox;
 pub mod mechanics;
 pub mod object_dictionary;
 pub mod servo_drive;

@@ -3,6 +3,7 @@
 use hexad::config::Config;
 use hexad_ethercat::bus::{Bus, Frames};
 use hexad_ethercat::drives_file::DrivesFile;
+use hexad_ethercat::inventory;
 use hexad_ethercat::segment::Segment;
 use hexad_ethercat::simulated_link::SimulatedLink;
 use hexad_ethercat::simulation;
@@ -38,7 +39,7 @@ pub fn bus(frames: &Frames, segment: Segment) -> TestBus<'_> {
 /// Devices in PRE-OP that agree with the file.
 pub fn checked(bus: &mut TestBus, file: &DrivesFile) -> Result<PreOpDevices, StartupErrors> {
     let devices = startup::find(bus)?;
-    match startup::contradictions(bus, &devices, file) {
+    match inventory::contradictions(bus, &devices, file) {
         errors if errors.is_empty() => Ok(devices),
         errors => Err(StartupErrors(errors)),
     }

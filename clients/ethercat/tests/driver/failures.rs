@@ -8,8 +8,8 @@ use hexad_ethercat::cia402::DriveState;
 use hexad_ethercat::cycle::DevicesLost;
 use hexad_ethercat::link::Link;
 use hexad_ethercat::segment::Segment;
+use hexad_ethercat::segment::application_layer::al_state::{ERROR, OP, SAFE_OP};
 use hexad_ethercat::segment::device::DeviceModel;
-use hexad_ethercat::segment::device::al_state::{ERROR, OP, SAFE_OP};
 
 use super::common::*;
 use super::rig::Rig;

@@ -3,7 +3,7 @@
 use hexad::config::Config;
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::drives_file::DrivesFile;
-use hexad_ethercat::{machine_check, scan, startup};
+use hexad_ethercat::{inventory, machine_check, scan, startup};
 
 use super::common::*;
 
@@ -46,7 +46,7 @@ fn a_scanned_file_is_right_but_for_what_only_the_user_knows() {
         .replace("# brake = ?", "brake = { status_bit = 12 }");
     let file =
         DrivesFile::parse(&completed, "completed").unwrap_or_else(|errors| panic!("{errors}\n{scanned}"));
-    assert_eq!(startup::contradictions(&mut bus, &devices, &file), [""; 0]);
+    assert_eq!(inventory::contradictions(&mut bus, &devices, &file), [""; 0]);
     let known = drives();
     for (leg, known) in file.legs.iter().zip(&known.legs) {
         let numbers = |leg: &hexad_ethercat::drives_file::LegSection| {

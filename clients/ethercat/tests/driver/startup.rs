@@ -2,7 +2,7 @@
 
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::segment::Segment;
-use hexad_ethercat::segment::device::al_state::{OP, PRE_OP, SAFE_OP};
+use hexad_ethercat::segment::application_layer::al_state::{OP, PRE_OP, SAFE_OP};
 use hexad_ethercat::segment::mechanics::Mechanics;
 use hexad_ethercat::simulation;
 
