@@ -24,31 +24,24 @@ pub struct BusSection {
     /// Network interface that only the drives are connected to.
     pub interface: String,
     /// Period of SYNC0, and of the daemon's loop.
-    #[serde(default = "default::period_us")]
     pub period_us: u32,
     /// The drives stop by themselves after so long without outputs.
-    #[serde(default = "default::watchdog_ms")]
     pub watchdog_ms: u32,
     /// Frames lost in a row that stop all drives.
-    #[serde(default = "default::lost_frames")]
     pub lost_frames: u32,
     /// Longest wait for the forces that respond to a measurement.
-    #[serde(default = "default::answer_us")]
     pub answer_us: u32,
     /// From SYNC0, at which the encoders are latched, to the frame that fetches them.
-    #[serde(default = "default::shift_us")]
     pub shift_us: u32,
     /// How the drives stop when no force may be applied.
-    #[serde(default)]
     pub on_brake: OnBrake,
 }
 
 /// Reaction when no force may be applied.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OnBrake {
     /// Quick stop of the drive (0x605a), which closes the brake.
-    #[default]
     QuickStop,
     /// Power off; the brake closes.
     DisableVoltage,
@@ -73,12 +66,10 @@ pub struct LegSection {
     /// Of the motor's encoder.
     pub counts_per_rev: f64,
     /// Revolutions of the motor for one of the screw.
-    #[serde(default = "default::one")]
     pub gear: f64,
     /// Travel for one revolution of the screw.
     pub lead_m: f64,
     /// Of gear and screw.
-    #[serde(default = "default::one")]
     pub efficiency: f64,
     /// 1 if increasing counts and positive torque lengthen the leg, else -1.
     pub sign: i8,
@@ -91,13 +82,10 @@ pub struct LegSection {
     /// How the open brake is known.
     pub brake: Brake,
     /// Objects to be written at the start.
-    #[serde(default)]
     pub sdo: Vec<SdoWrite>,
     /// Object that maps the outputs; the driver writes the mapping.
-    #[serde(default = "default::rx_pdo")]
     pub rx_pdo: u16,
     /// Object that maps the inputs.
-    #[serde(default = "default::tx_pdo")]
     pub tx_pdo: u16,
 }
 
@@ -128,32 +116,23 @@ pub struct SdoWrite {
     pub value: i64,
 }
 
-mod default {
-    pub fn period_us() -> u32 {
-        1000
-    }
-    pub fn watchdog_ms() -> u32 {
-        20
-    }
-    pub fn lost_frames() -> u32 {
-        3
-    }
-    pub fn answer_us() -> u32 {
-        400
-    }
-    pub fn shift_us() -> u32 {
-        100
-    }
-    pub fn one() -> f64 {
-        1.0
-    }
-    pub fn rx_pdo() -> u16 {
-        0x1600
-    }
-    pub fn tx_pdo() -> u16 {
-        0x1a00
-    }
-}
+/// Values of the top level that a file need not state.
+const BUS_DEFAULTS: &str = r#"
+period_us = 1000
+watchdog_ms = 20
+lost_frames = 3
+answer_us = 400
+shift_us = 100
+on_brake = "quick_stop"
+"#;
+/// The same of a leg.
+const LEG_DEFAULTS: &str = "
+gear = 1.0
+efficiency = 1.0
+sdo = []
+rx_pdo = 0x1600
+tx_pdo = 0x1a00
+";
 
 /// All errors of a file, a line each.
 #[derive(Debug, thiserror::Error)]
@@ -163,15 +142,13 @@ pub struct FileErrors(pub Vec<String>);
 impl DrivesFile {
     /// Reads and checks a text; error texts name it `place`.
     pub fn parse(text: &str, place: &str) -> Result<Self, FileErrors> {
-        let mut table: Table = text.parse().map_err(|error| FileErrors(vec![format!("{place}: {error}")]))?;
-        let defaults = match table.remove("drive") {
-            Some(Value::Table(defaults)) => defaults,
-            _ => Table::new(),
-        };
-        let rows = match table.remove("leg") {
-            Some(Value::Array(rows)) => rows,
-            _ => vec![],
-        };
+        let parsed = |text: &str| text.parse().map_err(|error| FileErrors(vec![format!("{place}: {error}")]));
+        let (mut table, mut defaults): (Table, Table) = (parsed(BUS_DEFAULTS)?, parsed(LEG_DEFAULTS)?);
+        table.extend(parsed(text)?);
+        if let Some(Value::Table(drive)) = table.remove("drive") {
+            defaults.extend(drive);
+        }
+        let rows = table.remove("leg").and_then(|legs| legs.as_array().cloned()).unwrap_or_default();
         let mut errors = vec![];
         let mut log = |section: &str, error: String| errors.push(format!("{place}: {section}{error}"));
         if rows.len() != LEGS {

@@ -34,7 +34,42 @@ pub fn jog<L: Link>(
     cycles: u64,
     is_stopped: impl Fn() -> bool,
 ) -> Result<Jog, String> {
-    let outcome = push(bus, devices, data, leg, force_n, cycles, is_stopped);
+    let mut push = || {
+        let (mut start_m, mut way_m, mut pushed, mut waited) = (None, 0.0f64, 0, 0);
+        while pushed < cycles && way_m.abs() < MAX_WAY_M && !is_stopped() {
+            match data.next_exchange(bus, devices) {
+                Exchange::Complete | Exchange::Early => {}
+                Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
+                Exchange::Lost if data.lost_in_row > 2 => return Err("frames do not come back".into()),
+                Exchange::Lost => continue,
+            }
+            for (number, drive) in (1..=LEGS).zip(&data.drives) {
+                if drive.state().is_fault() {
+                    return Err(format!(
+                        "leg {number} has the fault {:#06x}: reset it",
+                        drive.inputs().error_code
+                    ));
+                }
+            }
+            let Some(drive) = data.drives.get(leg) else {
+                return Err(format!("there is no leg {}", leg + 1));
+            };
+            let now_ns = bus.wire.link.now_ns();
+            let is_ready = drive.is_enabled() && drive.is_brake_open(now_ns);
+            if let Some(length_m) = drive.length_m().filter(|_| is_ready) {
+                way_m = length_m - *start_m.get_or_insert(length_m);
+                pushed += 1;
+            } else {
+                waited += 1;
+            }
+            if waited > MAX_READY_CYCLES {
+                return Err(format!("the drive is not ready: {:?}, brake closed", drive.state()));
+            }
+            command(data, leg, Goal::Enabled, if is_ready { force_n } else { 0.0 });
+        }
+        Ok(way_m)
+    };
+    let outcome: Result<f64, String> = push();
     for _ in 0..END_CYCLES {
         command(data, leg, Goal::Disabled, 0.0);
         data.next_exchange(bus, devices);
@@ -49,46 +84,4 @@ fn command(data: &mut ProcessData, leg: usize, goal: Goal, force_n: f64) {
         let (goal, force_n) = if index == leg { (goal, force_n) } else { (Goal::Disabled, 0.0) };
         *outputs = drive.command(goal, force_n);
     }
-}
-
-fn push<L: Link>(
-    bus: &mut Bus<L>,
-    devices: &OpDevices,
-    data: &mut ProcessData,
-    leg: usize,
-    force_n: f64,
-    cycles: u64,
-    is_stopped: impl Fn() -> bool,
-) -> Result<f64, String> {
-    let (mut start_m, mut way_m, mut pushed, mut waited) = (None, 0.0f64, 0, 0);
-    while pushed < cycles && way_m.abs() < MAX_WAY_M && !is_stopped() {
-        match data.next_exchange(bus, devices) {
-            Exchange::Complete | Exchange::Early => {}
-            Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
-            Exchange::Lost if data.lost_in_row > 2 => return Err("frames do not come back".into()),
-            Exchange::Lost => continue,
-        }
-        for (number, drive) in (1..=LEGS).zip(&data.drives) {
-            if drive.state().is_fault() {
-                return Err(format!(
-                    "leg {number} has the fault {:#06x}: reset it",
-                    drive.inputs().error_code
-                ));
-            }
-        }
-        let Some(drive) = data.drives.get(leg) else { return Err(format!("there is no leg {}", leg + 1)) };
-        let now_ns = bus.wire.link.now_ns();
-        let is_ready = drive.is_enabled() && drive.is_brake_open(now_ns);
-        if let Some(length_m) = drive.length_m().filter(|_| is_ready) {
-            way_m = length_m - *start_m.get_or_insert(length_m);
-            pushed += 1;
-        } else {
-            waited += 1;
-        }
-        if waited > MAX_READY_CYCLES {
-            return Err(format!("the drive is not ready: {:?}, brake closed", drive.state()));
-        }
-        command(data, leg, Goal::Enabled, if is_ready { force_n } else { 0.0 });
-    }
-    Ok(way_m)
 }

@@ -67,16 +67,10 @@ impl Device {
         memory[0x400..0x402].copy_from_slice(&2498u16.to_le_bytes());
         memory[0x420..0x422].copy_from_slice(&1000u16.to_le_bytes());
         memory[0x440] = 1;
-        let rated_mn_m = (model.units.rated_torque_n_m * 1000.0).round() as u32;
         Self {
             model,
             drive: ServoDrive::default(),
-            objects: ObjectDictionary::new(
-                model.identity,
-                model.units.counts_per_rev as u32,
-                rated_mn_m,
-                model.max_torque_permille,
-            ),
+            objects: ObjectDictionary::new(&model),
             refusal: None,
             is_encoder_reversed: false,
             is_watchdog_fixed: false,

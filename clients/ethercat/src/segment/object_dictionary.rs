@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::device::DeviceModel;
 use super::sii::Identity;
 use crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE_BIT;
 use crate::objects;
@@ -36,52 +37,43 @@ pub struct MappedObject {
 pub struct ObjectDictionary(BTreeMap<(u16, u8), Object>);
 
 impl ObjectDictionary {
-    /// Objects of a drive with a motor of this rated torque.
-    pub fn new(
-        identity: Identity,
-        counts_per_rev: u32,
-        rated_torque_mn_m: u32,
-        max_torque_permille: u16,
-    ) -> Self {
+    /// Objects of a device.
+    pub fn new(model: &DeviceModel) -> Self {
         let mut objects = BTreeMap::new();
-        let mut add = |index, sub, value: u64, bytes, is_writable| {
-            objects.insert((index, sub), Object { value, bytes, is_writable });
+        let mut add = |index, sub, value: u32, bytes, is_writable| {
+            objects.insert((index, sub), Object { value: value.into(), bytes, is_writable });
         };
-        let Identity { vendor, product, serial } = identity;
         // Servo drive of the profile 402.
         add(0x1000, 0, 0x0002_0192, 4, false);
-        for (sub, value) in (0u8..).zip([4, vendor, product, 1, serial]) {
-            add(0x1018, sub, u64::from(value), if sub == 0 { 1 } else { 4 }, false);
+        let Identity { vendor, product, serial } = model.identity;
+        for (sub, value) in (0..).zip([4, vendor, product, 1, serial]) {
+            add(0x1018, sub, value, if sub == 0 { 1 } else { 4 }, false);
         }
         // Uses of the sync managers, which SOEM reads.
-        for sub in 0..=4u8 {
-            add(0x1c00, sub, u64::from(if sub == 0 { 4 } else { sub }), 1, false);
+        for (sub, value) in (0..).zip([4, 1, 2, 3, 4]) {
+            add(0x1c00, sub, value, 1, false);
         }
-        for (index, bytes) in [
-            (objects::ERROR_CODE, 2),
-            (objects::STATUS_WORD, 2),
-            (objects::MODE_DISPLAY, 1),
-            (objects::POSITION, 4),
-            (objects::ACTUAL_TORQUE, 2),
-            (objects::DIGITAL_INPUTS, 4),
+        let rated_mn_m = (model.units.rated_torque_n_m * 1000.0).round() as u32;
+        let modes = CYCLIC_SYNCHRONOUS_TORQUE_BIT | 1 << 7 | 1 << 8;
+        for (index, sub, value, bytes) in [
+            (objects::ERROR_CODE, 0, 0, 2),
+            (objects::STATUS_WORD, 0, 0, 2),
+            (objects::MODE_DISPLAY, 0, 0, 1),
+            (objects::POSITION, 0, 0, 4),
+            (objects::ACTUAL_TORQUE, 0, 0, 2),
+            (objects::DIGITAL_INPUTS, 0, 0, 4),
+            (objects::ENCODER_RESOLUTION, 1, model.units.counts_per_rev as u32, 4),
+            (objects::ENCODER_RESOLUTION, 2, 1, 4),
+            (objects::RATED_TORQUE, 0, rated_mn_m, 4),
+            (objects::SUPPORTED_MODES, 0, modes, 4),
         ] {
-            add(index, 0, 0, bytes, false);
+            add(index, sub, value, bytes, false);
         }
-        add(objects::ENCODER_RESOLUTION, 1, u64::from(counts_per_rev), 4, false);
-        add(objects::ENCODER_RESOLUTION, 2, 1, 4, false);
-        add(objects::RATED_TORQUE, 0, u64::from(rated_torque_mn_m), 4, false);
-        add(
-            objects::SUPPORTED_MODES,
-            0,
-            u64::from(CYCLIC_SYNCHRONOUS_TORQUE_BIT | 1 << 7 | 1 << 8),
-            4,
-            false,
-        );
         for (index, sub, value, bytes) in [
             (objects::CONTROL_WORD, 0, 0, 2),
             (objects::MODE, 0, 0, 1),
             (objects::TARGET_TORQUE, 0, 0, 2),
-            (objects::MAX_TORQUE, 0, u64::from(max_torque_permille), 2),
+            (objects::MAX_TORQUE, 0, model.max_torque_permille.into(), 2),
             // Reaction to the quick stop; interpolation time; synchronization of outputs and inputs.
             (0x605a, 0, 2, 2),
             (0x60c2, 1, 1, 1),

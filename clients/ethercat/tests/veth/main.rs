@@ -8,30 +8,31 @@ mod not_run;
 #[path = "../../../../tests/common/python.rs"]
 mod python;
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Mutex;
 use std::thread::sleep;
 use std::time::Duration;
 use std::{env, fs};
 
-use network::Network;
+use clap::Parser;
+use hexad::commands::CommandLine;
+use hexad::commands::log::{self, LogFormat};
+use network::{HEXAD_ARGUMENTS, Network};
 
 const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
 
 /// One loop at a time: they are real-time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-fn driver() -> &'static Path {
-    Path::new(env!("CARGO_BIN_EXE_hexad-ethercat"))
-}
-
-/// The command `hexad`, of the same build.
-fn hexad() -> PathBuf {
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--quiet", "-p", "hexad", "--bin", "hexad"]).current_dir(env!("CARGO_MANIFEST_DIR"));
-    assert!(cargo.status().unwrap().success());
-    driver().with_file_name("hexad")
+/// Not a test: the command `hexad` as a process, without building it once more.
+#[test]
+#[ignore = "the other tests start it"]
+fn hexad_process() {
+    let arguments = env::var(HEXAD_ARGUMENTS).unwrap();
+    let command = CommandLine::parse_from(["hexad"].into_iter().chain(arguments.split(' ')));
+    log::install(LogFormat::Text);
+    if let Err(failure) = command.execute() {
+        panic!("{}", failure.message);
+    }
 }
 
 /// A network with the files of a machine of its own, and the simulated drives at one end of its cable.
@@ -49,7 +50,7 @@ fn simulated(test: &str, options: &str) -> Option<Network> {
     let sections = "\n[realtime]\nrelease = \"external\"\n[drive]\ndelay_us = 1000.0\n";
     fs::write(network.path("m.toml"), machine.replace("\"motion_base\"", &name) + sections).unwrap();
     fs::write(network.path("d.toml"), DRIVES.replace("\"motion_base\"", &name)).unwrap();
-    network.start("simulate", driver(), &format!("simulate d.toml m.toml --interface ec1{options}"));
+    network.start("simulate", network.driver(&format!("simulate d.toml m.toml --interface ec1{options}")));
     network.wait_for("simulate", "switched on", 1);
     Some(network)
 }
@@ -57,40 +58,39 @@ fn simulated(test: &str, options: &str) -> Option<Network> {
 #[test]
 fn the_daemon_drives_the_platform_over_the_bus() {
     let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let hexad = hexad();
     let Some(mut network) = simulated("run", "") else { return };
-    assert!(network.output(driver(), "check d.toml --machine m.toml").contains("no error"));
-    network.start("daemon", &hexad, "run m.toml");
-    network.start("run", driver(), "run d.toml m.toml");
+    assert!(network.output(network.driver("check d.toml --machine m.toml")).contains("no error"));
+    network.start("daemon", network.hexad("run m.toml"));
+    network.start("run", network.driver("run d.toml m.toml"));
     network.wait_for("run", "six drives in OP", 1);
     let seconds = if env::var_os("HEXAD_LONG").is_some() { 600 } else { 6 };
     for motion in ["sines", "minimum-jerk"] {
         let text = network.output(
-            &hexad,
-            &format!("move --config m.toml --motion {motion} --seconds {} --engage", seconds / 2),
+            network
+                .hexad(&format!("move --config m.toml --motion {motion} --seconds {} --engage", seconds / 2)),
         );
         println!("{motion}: {text}");
     }
-    let log = network.log("daemon");
-    assert!(!log.contains("fault"), "{log}");
+    let daemon = network.log("daemon");
+    assert!(!daemon.contains("fault"), "{daemon}");
     // Killed in motion: the watchdogs of the drives close the brakes.
     let motion = "move --config m.toml --motion sines --seconds 60 --engage";
-    network.start("move", &hexad, motion);
+    network.start("move", network.hexad(motion));
     network.wait_for("move", "in control: moving", 1);
     sleep(Duration::from_secs(2));
     network.signal("run", libc::SIGKILL);
     network.wait_for("simulate", "al_status=20 drive=Fault is_brake_open=false", 6);
     network.wait_for("daemon", "code=101", 1);
     // The same bus, started again; an operator clears the daemon's fault, and the drives' with it.
-    network.start("run", driver(), "run d.toml m.toml");
+    network.start("run", network.driver("run d.toml m.toml"));
     network.wait_for("run", "six drives in OP", 1);
     network.wait_for("run", "leg 6 has the fault 0x7500", 1);
-    network.output(&hexad, "clear --config m.toml");
+    network.output(network.hexad("clear --config m.toml"));
     network.wait_for("run", "faults of drives are acknowledged", 1);
     network.signal("move", libc::SIGINT);
     sleep(Duration::from_millis(500));
-    network.output(&hexad, "goto --config m.toml --home --engage");
-    network.start("move", &hexad, motion);
+    network.output(network.hexad("goto --config m.toml --home --engage"));
+    network.start("move", network.hexad(motion));
     network.wait_for("move", "in control: moving", 1);
     sleep(Duration::from_secs(1));
     // The daemon is killed: the forces expire.
@@ -106,9 +106,9 @@ fn the_daemon_drives_the_platform_over_the_bus() {
 fn commands_that_use_the_bus_for_a_moment() {
     let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let Some(network) = simulated("jog", " --uncoupled") else { return };
-    let output = |arguments: &str| network.output(driver(), arguments);
+    let output = |arguments: &str| network.output(network.driver(arguments));
     let refused = |arguments: &str| {
-        let ended = network.command(driver(), arguments).output().unwrap();
+        let ended = network.driver(arguments).output().unwrap();
         assert!(!ended.status.success(), "{arguments}");
         String::from_utf8_lossy(&ended.stderr).into_owned()
     };
@@ -131,7 +131,7 @@ fn commands_that_use_the_bus_for_a_moment() {
     output("reset d.toml");
     assert!(refused("scan ec7").contains("interface ec7 does not exist"));
     assert!(refused("scan lo").contains("no carrier"), "lo is down");
-    let mut busy = network.command(driver(), "simulate d.toml m.toml --interface ec1");
+    let mut busy = network.driver("simulate d.toml m.toml --interface ec1");
     let text = String::from_utf8_lossy(&busy.output().unwrap().stderr).into_owned();
     assert!(text.contains("another hexad-ethercat uses ec1"), "{text}");
 }
@@ -145,6 +145,6 @@ fn soem_brings_the_drives_to_op() {
     };
     let Some(network) = simulated("soem", "") else { return };
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/veth/soem.py");
-    let text = network.output(&environment.join("bin/python"), &format!("{script} ec0"));
+    let text = network.output(network.command(&environment.join("bin/python"), &format!("{script} ec0")));
     assert!(text.contains("working counter 18 of 18 enabled 6"), "{text}");
 }

@@ -1,10 +1,14 @@
 //! A network of its own for each test: a cable between the interfaces `ec0` and `ec1`, and processes in it.
 
+use std::env;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+
+/// Arguments of the command `hexad`.
+pub const HEXAD_ARGUMENTS: &str = "HEXAD_TEST_ARGUMENTS";
 
 /// Network namespace with the cable, a folder with files, and the processes that run in it.
 pub struct Network {
@@ -51,10 +55,22 @@ impl Network {
         command
     }
 
+    /// The command `hexad-ethercat`.
+    pub fn driver(&self, arguments: &str) -> Command {
+        self.command(Path::new(env!("CARGO_BIN_EXE_hexad-ethercat")), arguments)
+    }
+
+    /// The command `hexad`: this program in the role of [`crate::hexad_process`].
+    pub fn hexad(&self, arguments: &str) -> Command {
+        let program = env::current_exe().unwrap();
+        let mut command = self.command(&program, "--exact hexad_process --ignored --nocapture --quiet");
+        command.env(HEXAD_ARGUMENTS, arguments);
+        command
+    }
+
     /// Starts a process whose output is the file `name`.
-    pub fn start(&mut self, name: &'static str, program: &Path, arguments: &str) {
+    pub fn start(&mut self, name: &'static str, mut command: Command) {
         let log = File::create(self.path(name)).unwrap();
-        let mut command = self.command(program, arguments);
         let child =
             command.stdout(log.try_clone().unwrap()).stderr(log).stdin(Stdio::null()).spawn().unwrap();
         self.processes.retain(|(started, _)| *started != name);
@@ -99,11 +115,11 @@ impl Network {
     }
 
     /// What a command prints; it must succeed.
-    pub fn output(&self, program: &Path, arguments: &str) -> String {
-        let ended = self.command(program, arguments).output().unwrap();
+    pub fn output(&self, mut command: Command) -> String {
+        let ended = command.output().unwrap();
         let text =
             [ended.stdout, ended.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
-        assert!(ended.status.success(), "{arguments}: {text}");
+        assert!(ended.status.success(), "{command:?}: {text}");
         text
     }
 }
