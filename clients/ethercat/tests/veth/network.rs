@@ -77,6 +77,12 @@ impl Network {
         self.processes.push((name, child));
     }
 
+    /// Whether a process has not ended.
+    pub fn is_running(&mut self, name: &str) -> bool {
+        let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
+        child.try_wait().unwrap().is_none()
+    }
+
     /// Sends a signal to a process.
     pub fn signal(&mut self, name: &str, signal: i32) {
         let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
@@ -105,7 +111,7 @@ impl Network {
     }
 
     /// The last lines of all processes.
-    fn ends(&self) -> String {
+    pub fn ends(&self) -> String {
         let end = |name: &&'static str| {
             let log = self.log(name);
             let lines: Vec<_> = log.lines().collect();
