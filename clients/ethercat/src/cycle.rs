@@ -100,7 +100,6 @@ impl<D: Daemon> Driver<D> {
     /// One period of SYNC0.
     pub fn cycle<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices) -> Result<(), DevicesLost> {
         self.counts.cycles += 1;
-        let period_ns = u64::from(self.timing.period_us) * 1000;
         let exchange = self.data.next_exchange(bus, devices);
         self.supervise(exchange);
         if exchange == Exchange::Complete {
@@ -111,9 +110,9 @@ impl<D: Daemon> Driver<D> {
         }
         self.command(bus.wire.link.now_ns());
         if self.data.outputs != self.data.sent {
-            let last_ns = self.data.clock.next_sync0_ns() - period_ns / SECOND_EXCHANGE_SHARE;
-            if bus.wire.link.now_ns() < last_ns {
-                self.data.exchange(bus, devices, period_ns / SECOND_EXCHANGE_SHARE);
+            let now_ns = bus.wire.link.now_ns();
+            if now_ns < self.second_exchange_ns() {
+                self.data.exchange(bus, devices, self.data.clock.next_sync0_ns());
             } else {
                 self.counts.late += 1;
             }
@@ -126,6 +125,12 @@ impl<D: Daemon> Driver<D> {
             return Ok(());
         }
         Err(DevicesLost { reachable: if self.data.lost_in_row > 0 { 0 } else { reachable } })
+    }
+
+    /// Latest instant of a second exchange in this period \[ns\].
+    fn second_exchange_ns(&self) -> u64 {
+        let period_ns = u64::from(self.timing.period_us) * 1000;
+        self.data.clock.next_sync0_ns() - period_ns / SECOND_EXCHANGE_SHARE
     }
 
     /// Publishes what the drives latched at the last SYNC0.
@@ -145,8 +150,10 @@ impl<D: Daemon> Driver<D> {
 
     /// Waits for the forces that respond to the last measurement, no longer than `answer_us`.
     fn wait_for_forces<L: Link>(&mut self, bus: &mut Bus<L>) {
+        let last_ns = self.second_exchange_ns();
         let link = &mut bus.wire.link;
-        let until_ns = link.now_ns() + u64::from(self.timing.answer_us) * 1000;
+        let answer_ns = u64::from(self.timing.answer_us) * 1000;
+        let until_ns = (link.now_ns() + answer_ns).min(last_ns);
         loop {
             self.receive_forces(link.now_ns());
             if self.permission.release_ns() == self.data.clock.sync0_ns() {

@@ -73,18 +73,17 @@ impl ProcessData {
         // After a pause of the host the next SYNC0 may have just passed.
         self.clock.advance_to(link.now_ns());
         link.sleep_until(self.clock.sync0_ns() + self.shift_ns);
-        self.exchange(bus, devices, self.period_ns / 4)
+        self.exchange(bus, devices, self.clock.sync0_ns() + self.period_ns / 2)
     }
 
-    /// Sends the outputs, receives the inputs. A frame that does not come back in time is lost.
-    pub fn exchange<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices, timeout_ns: u64) -> Exchange {
+    /// Sends the outputs, receives the inputs. A frame that has not come back at an instant \[ns\] is lost.
+    pub fn exchange<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices, deadline_ns: u64) -> Exchange {
         let Bus { main, wire } = bus;
         for (outputs, position) in self.outputs.iter().zip(self.position_of_leg) {
             if let Ok(device) = devices.subdevice(main, position) {
                 outputs.write(&mut device.outputs_raw_mut());
             }
         }
-        let deadline_ns = wire.link.now_ns() + timeout_ns;
         let Some(Ok(response)) = wire.run_until(devices.tx_rx_dc(main), deadline_ns) else {
             self.lost_frames += 1;
             self.lost_in_row += 1;
