@@ -81,7 +81,7 @@ impl<L: Link> Wire<'_, L> {
     pub fn run<F: Future>(&mut self, future: F) -> F::Output {
         let mut future = pin!(future);
         loop {
-            if let Some(output) = self.poll(future.as_mut(), u64::MAX) {
+            if let Some(output) = self.run_until(future.as_mut(), u64::MAX) {
                 return output;
             }
         }

@@ -55,11 +55,9 @@ pub struct Counts {
 
 /// Failure that only a new start of the bus can end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{reachable} of {LEGS} drives answer: look at their cables and power; the bus has to be started again"
-)]
+#[error("{reachable} of {LEGS} drives answer: look at cables and power; the bus has to be started again")]
 pub struct DevicesLost {
-    /// Devices that still answer.
+    /// Devices that still answer, in OP or SAFE-OP.
     pub reachable: usize,
 }
 
@@ -120,11 +118,15 @@ impl<D: Daemon> Driver<D> {
         self.recover(bus);
         let is_answered = matches!(exchange, Exchange::Complete | Exchange::Early);
         self.missing_cycles = if is_answered { 0 } else { self.missing_cycles + 1 };
-        let reachable = self.data.states.iter().filter(|state| **state != SubDeviceState::None).count();
-        if self.missing_cycles < MAX_MISSING_CYCLES || (reachable == LEGS && self.data.lost_in_row == 0) {
+        let is_usable =
+            |state: &&SubDeviceState| matches!(state, SubDeviceState::Op | SubDeviceState::SafeOp);
+        let usable = self.data.states.iter().filter(is_usable).count();
+        let reachable = if self.data.lost_in_row > 0 { 0 } else { usable };
+        // Devices in SAFE-OP are on their way back.
+        if self.missing_cycles < MAX_MISSING_CYCLES || reachable == LEGS {
             return Ok(());
         }
-        Err(DevicesLost { reachable: if self.data.lost_in_row > 0 { 0 } else { reachable } })
+        Err(DevicesLost { reachable })
     }
 
     /// Latest instant of a second exchange in this period \[ns\].

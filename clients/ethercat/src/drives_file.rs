@@ -61,8 +61,6 @@ pub struct LegSection {
     pub serial: u32,
     /// Serial number of the drive with which `jog` has found the right direction.
     pub jogged_serial: Option<u32>,
-    /// Station alias, where it is checked.
-    pub alias: Option<u16>,
     /// Of the motor's encoder.
     pub counts_per_rev: f64,
     /// Revolutions of the motor for one of the screw.
@@ -134,15 +132,15 @@ rx_pdo = 0x1600
 tx_pdo = 0x1a00
 ";
 
-/// All errors of a file, a line each.
+/// Errors that were found together, a line each.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
-pub struct FileErrors(pub Vec<String>);
+pub struct ErrorList(pub Vec<String>);
 
 impl DrivesFile {
     /// Reads and checks a text; error texts name it `place`.
-    pub fn parse(text: &str, place: &str) -> Result<Self, FileErrors> {
-        let parsed = |text: &str| text.parse().map_err(|error| FileErrors(vec![format!("{place}: {error}")]));
+    pub fn parse(text: &str, place: &str) -> Result<Self, ErrorList> {
+        let parsed = |text: &str| text.parse().map_err(|error| ErrorList(vec![format!("{place}: {error}")]));
         let (mut table, mut defaults): (Table, Table) = (parsed(BUS_DEFAULTS)?, parsed(LEG_DEFAULTS)?);
         table.extend(parsed(text)?);
         if let Some(Value::Table(drive)) = table.remove("drive") {
@@ -178,7 +176,7 @@ impl DrivesFile {
         }
         match (bus, legs.try_into()) {
             (Some(bus), Ok(legs)) if errors.is_empty() => Ok(Self { bus, legs }),
-            _ => Err(FileErrors(errors)),
+            _ => Err(ErrorList(errors)),
         }
     }
 
@@ -208,56 +206,60 @@ fn read<T: for<'d> Deserialize<'d>>(table: Table) -> Result<T, String> {
     Value::Table(table).try_into().map_err(|error| error.to_string().trim().replace('\n', " "))
 }
 
-/// The error of a key whose value is outside of its bounds.
-fn outside(key: &str, value: f64, low: f64, high: f64) -> Option<String> {
-    let is_inside = (low..=high).contains(&value);
-    (!is_inside).then(|| format!("{key} = {value}: must be in [{low}, {high}]"))
+/// Adds an error for each key whose value is outside of its bounds.
+fn check(errors: &mut Vec<String>, rows: &[(&str, f64, f64, f64)]) {
+    let outside = rows.iter().filter(|(_, value, low, high)| !(*low..=*high).contains(value));
+    errors.extend(
+        outside.map(|(key, value, low, high)| format!("{key} = {value}: must be in [{low}, {high}]")),
+    );
 }
 
 impl BusSection {
     fn errors(&self) -> Vec<String> {
         let period_us = f64::from(self.period_us);
-        let half = period_us / 2.0;
-        [
-            outside("period_us", period_us, 250.0, 10_000.0),
-            outside("watchdog_ms", f64::from(self.watchdog_ms), (2.0 * period_us / 1000.0).ceil(), 100.0),
-            outside("lost_frames", f64::from(self.lost_frames), 1.0, 10.0),
-            outside("shift_us", f64::from(self.shift_us), 0.0, half),
-            outside("answer_us", f64::from(self.answer_us), 50.0, half),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let mut errors = vec![];
+        check(
+            &mut errors,
+            &[
+                ("period_us", period_us, 250.0, 10_000.0),
+                ("watchdog_ms", self.watchdog_ms.into(), (2.0 * period_us / 1000.0).ceil(), 100.0),
+                ("lost_frames", self.lost_frames.into(), 1.0, 10.0),
+                ("shift_us", self.shift_us.into(), 0.0, period_us / 2.0),
+                ("answer_us", self.answer_us.into(), 50.0, period_us / 2.0),
+            ],
+        );
+        errors
     }
 }
 
 impl LegSection {
     fn errors(&self) -> Vec<String> {
-        let bit = match self.brake {
-            Brake::StatusBit(bit) => outside("brake.status_bit", f64::from(bit), 0.0, 15.0),
-            Brake::InputBit(bit) => outside("brake.input_bit", f64::from(bit), 0.0, 31.0),
-            Brake::OpenMs(time) => outside("brake.open_ms", f64::from(time), 0.0, 2000.0),
+        let mut errors = vec![];
+        let brake = match self.brake {
+            Brake::StatusBit(bit) => ("brake.status_bit", bit.into(), 0.0, 15.0),
+            Brake::InputBit(bit) => ("brake.input_bit", bit.into(), 0.0, 31.0),
+            Brake::OpenMs(time) => ("brake.open_ms", time.into(), 0.0, 2000.0),
         };
-        let sizes = self.sdo.iter().filter(|write| !matches!(write.bytes, 1 | 2 | 4));
-        let mut errors: Vec<String> = [
-            outside("position", self.position as f64, 1.0, LEGS as f64),
-            outside("counts_per_rev", self.counts_per_rev, 100.0, 1e9),
-            outside("gear", self.gear, 0.01, 1000.0),
-            outside("lead_m", self.lead_m, 1e-4, 1.0),
-            outside("efficiency", self.efficiency, 0.1, 1.0),
-            outside("offset_m", self.offset_m, -1e4, 1e4),
-            outside("rated_torque_n_m", self.rated_torque_n_m, 1e-3, 1e4),
-            outside("max_torque_permille", f64::from(self.max_torque_permille), 1.0, 30_000.0),
-            (self.sign.abs() != 1).then(|| format!("sign = {}: must be 1 or -1", self.sign)),
-            bit,
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        errors
-            .extend(sizes.map(|write| {
-                format!("sdo {:#06x}: bytes = {}: must be 1, 2 or 4", write.index, write.bytes)
-            }));
+        check(
+            &mut errors,
+            &[
+                ("position", self.position as f64, 1.0, LEGS as f64),
+                ("counts_per_rev", self.counts_per_rev, 100.0, 1e9),
+                ("gear", self.gear, 0.01, 1000.0),
+                ("lead_m", self.lead_m, 1e-4, 1.0),
+                ("efficiency", self.efficiency, 0.1, 1.0),
+                ("offset_m", self.offset_m, -1e4, 1e4),
+                ("rated_torque_n_m", self.rated_torque_n_m, 1e-3, 1e4),
+                ("max_torque_permille", self.max_torque_permille.into(), 1.0, 30_000.0),
+                brake,
+            ],
+        );
+        if self.sign.abs() != 1 {
+            errors.push(format!("sign = {}: must be 1 or -1", self.sign));
+        }
+        for write in self.sdo.iter().filter(|write| !matches!(write.bytes, 1 | 2 | 4)) {
+            errors.push(format!("sdo {:#06x}: bytes = {}: must be 1, 2 or 4", write.index, write.bytes));
+        }
         errors
     }
 

@@ -14,28 +14,6 @@ use crate::link::Link;
 
 const ETHERCAT: u16 = 0x88a4;
 
-/// Error of opening an interface.
-#[derive(Debug, thiserror::Error)]
-pub enum InterfaceError {
-    /// There is none of this name.
-    #[error("interface {0} does not exist: `ip link` lists the interfaces; correct `interface`")]
-    Missing(String),
-    /// Nothing is connected.
-    #[error(
-        "interface {0} has no carrier: look at the cable, the power of the drives, and `ip link set {0} up`"
-    )]
-    NoCarrier(String),
-    /// Another process uses it.
-    #[error("another hexad-ethercat uses {0}: end it first")]
-    Busy(String),
-    /// The process may not.
-    #[error("no right to raw frames on {0}: run as root, or with CAP_NET_RAW (the unit has it)")]
-    NoRight(String),
-    /// Another error of the system.
-    #[error("interface {0}: {1}")]
-    System(String, io::Error),
-}
-
 /// Raw socket of one interface.
 #[derive(Debug)]
 pub struct RawSocket {
@@ -45,22 +23,27 @@ pub struct RawSocket {
 }
 
 impl RawSocket {
-    /// Opens an interface for EtherCAT alone.
-    pub fn open(name: &str) -> Result<Self, InterfaceError> {
-        use InterfaceError::{Busy, Missing, NoCarrier, NoRight, System};
-        let system = |error| System(name.into(), error);
-        let index = interface_index(name).ok_or_else(|| Missing(name.into()))?;
+    /// Opens an interface for EtherCAT alone; the error in words.
+    pub fn open(name: &str) -> Result<Self, String> {
+        let system = |error: io::Error| match error.kind() {
+            io::ErrorKind::AddrInUse => format!("another hexad-ethercat uses {name}: end it first"),
+            io::ErrorKind::PermissionDenied => {
+                format!(
+                    "no right to raw frames on {name}: run as root, or with CAP_NET_RAW (the unit has it)"
+                )
+            }
+            _ => format!("interface {name}: {error}"),
+        };
+        let index = interface_index(name).ok_or_else(|| {
+            format!("interface {name} does not exist: `ip link` lists the interfaces; correct `interface`")
+        })?;
         let address = SocketAddr::from_abstract_name(format!("hexad-ethercat/{name}")).map_err(system)?;
-        let reservation = UnixListener::bind_addr(&address).map_err(|error| match error.kind() {
-            io::ErrorKind::AddrInUse => Busy(name.into()),
-            _ => system(error),
-        })?;
-        let socket = bound_socket(index).map_err(|error| match error.kind() {
-            io::ErrorKind::PermissionDenied => NoRight(name.into()),
-            _ => system(error),
-        })?;
+        let reservation = UnixListener::bind_addr(&address).map_err(system)?;
+        let socket = bound_socket(index).map_err(system)?;
         if !has_carrier(&socket, name).map_err(system)? {
-            return Err(NoCarrier(name.into()));
+            return Err(format!(
+                "interface {name} has no carrier: look at cable and power of the drives, and at `ip link set {name} up`"
+            ));
         }
         Ok(Self { socket, _reservation: reservation })
     }

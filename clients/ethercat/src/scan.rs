@@ -19,11 +19,12 @@ pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str
          gear = 1.0\nefficiency = 1.0\n"
     );
     for (position, identity) in identities(bus, devices).into_iter().enumerate() {
-        let mut read = |index, sub| bus.sdo_read::<u32>(devices, position, index, sub).ok();
-        let rated_n_m = read(objects::RATED_TORQUE, 0).map(|value| f64::from(value) * 1e-3);
-        let increments = read(objects::ENCODER_RESOLUTION, 1).map(f64::from);
-        let revolutions = read(objects::ENCODER_RESOLUTION, 2).map_or(1.0, f64::from);
-        let max_torque = bus.sdo_read::<u16>(devices, position, objects::MAX_TORQUE, 0).ok();
+        let mut objects = bus.objects(devices, position);
+        let mut read = |index, sub| objects.value(index, sub).ok().map(|value| value as f64);
+        let rated_n_m = read(objects::RATED_TORQUE, 0).map(|value| value * 1e-3);
+        let increments = read(objects::ENCODER_RESOLUTION, 1);
+        let revolutions = read(objects::ENCODER_RESOLUTION, 2).unwrap_or(1.0);
+        let max_torque = read(objects::MAX_TORQUE, 0);
         // Writing to a string cannot fail.
         let _ = write!(
             text,
@@ -34,18 +35,15 @@ pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str
             identity.serial
         );
         for (key, value) in [
-            ("counts_per_rev", increments.map(|increments| increments / revolutions)),
-            ("rated_torque_n_m", rated_n_m),
+            ("counts_per_rev", increments.map(|increments| format!("{:?}", increments / revolutions))),
+            ("rated_torque_n_m", rated_n_m.map(|value| format!("{value:?}"))),
+            ("max_torque_permille", max_torque.map(|value| value.to_string())),
         ] {
             let _ = match value {
-                Some(value) => writeln!(text, "{key} = {value:?}"),
+                Some(value) => writeln!(text, "{key} = {value}"),
                 None => writeln!(text, "# {key} = ?"),
             };
         }
-        let _ = match max_torque {
-            Some(value) => writeln!(text, "max_torque_permille = {value}"),
-            None => writeln!(text, "# max_torque_permille = ?"),
-        };
     }
     text
 }

@@ -1,4 +1,4 @@
-//! Objects of drives over their mailboxes: service data objects (SDO).
+//! Objects of a drive over its mailbox: service data objects (SDO).
 
 use ethercrab::EtherCrabWireReadSized;
 use ethercrab::error::{Error, MailboxError, PduError};
@@ -7,6 +7,9 @@ use crate::bus::Bus;
 use crate::drives_file::SdoWrite;
 use crate::link::Link;
 use crate::startup::PreOpDevices;
+
+/// Emergencies in place of a response after which a transfer is given up.
+const MAX_EMERGENCIES: u32 = 8;
 
 /// An error of the bus in words.
 pub(crate) fn words(error: Error) -> String {
@@ -19,73 +22,66 @@ pub(crate) fn words(error: Error) -> String {
     }
 }
 
-impl<L: Link> Bus<'_, L> {
-    /// Reads an object of at most 4 bytes.
-    pub fn sdo_read<T: EtherCrabWireReadSized>(
-        &mut self,
-        devices: &PreOpDevices,
-        position: usize,
-        index: u16,
-        sub: u8,
-    ) -> Result<T, Error> {
-        self.with_emergency(|bus| {
-            let device = devices.subdevice(&bus.main, position)?;
-            bus.wire.run(device.sdo_read(index, sub))
+/// Access to the objects of the drive at a position of the bus, from 0.
+pub struct Objects<'b, 'f, L> {
+    bus: &'b mut Bus<'f, L>,
+    devices: &'b PreOpDevices,
+    position: usize,
+}
+
+impl<'f, L: Link> Bus<'f, L> {
+    /// Objects of the drive at a position, from 0.
+    pub fn objects<'b>(&'b mut self, devices: &'b PreOpDevices, position: usize) -> Objects<'b, 'f, L> {
+        Objects { bus: self, devices, position }
+    }
+}
+
+impl<L: Link> Objects<'_, '_, L> {
+    /// Reads an object that is as long as the type.
+    pub fn read<T: EtherCrabWireReadSized>(&mut self, index: u16, sub: u8) -> Result<T, Error> {
+        self.repeated(|objects| {
+            let device = objects.devices.subdevice(&objects.bus.main, objects.position)?;
+            objects.bus.wire.run(device.sdo_read(index, sub))
         })
     }
 
     /// Value of an object of 1, 2 or 4 bytes.
-    pub fn sdo_value(
-        &mut self,
-        devices: &PreOpDevices,
-        position: usize,
-        index: u16,
-        sub: u8,
-    ) -> Result<i64, String> {
-        // A response that is shorter than the type is an error of its own kind.
+    pub fn value(&mut self, index: u16, sub: u8) -> Result<i64, String> {
         let is_short = |error: &Error| matches!(error, Error::Wire(_) | Error::Pdu(PduError::Decode));
-        let value = match self.sdo_read::<i32>(devices, position, index, sub) {
-            Err(error) if is_short(&error) => match self.sdo_read::<i16>(devices, position, index, sub) {
-                Err(error) if is_short(&error) => {
-                    self.sdo_read::<i8>(devices, position, index, sub).map(i64::from)
-                }
-                other => other.map(i64::from),
-            },
-            other => other.map(i64::from),
-        };
+        let mut value = self.read::<i32>(index, sub).map(i64::from);
+        if value.as_ref().is_err_and(is_short) {
+            value = self.read::<i16>(index, sub).map(i64::from);
+        }
+        if value.as_ref().is_err_and(is_short) {
+            value = self.read::<i8>(index, sub).map(i64::from);
+        }
         value.map_err(words)
     }
 
     /// Writes an object.
-    pub fn sdo_write(
-        &mut self,
-        devices: &PreOpDevices,
-        position: usize,
-        write: SdoWrite,
-    ) -> Result<(), String> {
+    pub fn write(&mut self, write: SdoWrite) -> Result<(), String> {
         let SdoWrite { index, sub, bytes, value } = write;
-        self.with_emergency(|bus| {
-            let device = devices.subdevice(&bus.main, position)?;
+        let written = self.repeated(|objects| {
+            let Bus { main, wire } = &mut *objects.bus;
+            let device = objects.devices.subdevice(main, objects.position)?;
             match bytes {
-                1 => bus.wire.run(device.sdo_write(index, sub, value as u8)),
-                2 => bus.wire.run(device.sdo_write(index, sub, value as u16)),
-                _ => bus.wire.run(device.sdo_write(index, sub, value as u32)),
+                1 => wire.run(device.sdo_write(index, sub, value as u8)),
+                2 => wire.run(device.sdo_write(index, sub, value as u16)),
+                _ => wire.run(device.sdo_write(index, sub, value as u32)),
             }
-        })
-        .map_err(words)
+        });
+        written.map_err(words)
     }
 
-    /// Repeats a transfer in whose place the device sent an emergency. Each emergency is kept in the wire's list.
-    fn with_emergency<T>(
-        &mut self,
-        mut transfer: impl FnMut(&mut Self) -> Result<T, Error>,
-    ) -> Result<T, Error> {
-        loop {
-            self.wire.emergency = None;
+    /// Repeats a transfer in whose place the device sent an emergency.
+    fn repeated<T>(&mut self, mut transfer: impl FnMut(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
+        for _ in 1..MAX_EMERGENCIES {
+            self.bus.wire.emergency = None;
             let result = transfer(self);
-            if self.wire.emergency.is_none() {
+            if self.bus.wire.emergency.is_none() {
                 return result;
             }
         }
+        transfer(self)
     }
 }

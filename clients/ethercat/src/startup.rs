@@ -10,7 +10,7 @@ use ethercrab::{
 
 use crate::bus::{Bus, MAX_DEVICES, MAX_PROCESS_DATA};
 use crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE;
-use crate::drives_file::{BusSection, DrivesFile, LegSection, SdoWrite};
+use crate::drives_file::{BusSection, DrivesFile, ErrorList, LegSection, SdoWrite};
 use crate::link::Link;
 use crate::objects;
 use crate::process_image::{OUTPUT_ENTRIES, Outputs, input_entries};
@@ -28,30 +28,22 @@ pub(crate) const FIRST_ADDRESS: u16 = 0x1000;
 const SYNC0_DELAY: Duration = Duration::from_millis(50);
 /// Cycles within which all devices must be in OP.
 const MAX_CYCLES_TO_OP: u32 = 3000;
-/// Errors that keep the driver from starting, a line each.
-#[derive(Debug, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct StartupErrors(pub Vec<String>);
-
-impl From<String> for StartupErrors {
-    fn from(error: String) -> Self {
-        Self(vec![error])
-    }
-}
 
 /// Brings all devices to PRE-OP.
-pub fn find<L: Link>(bus: &mut Bus<L>) -> Result<PreOpDevices, StartupErrors> {
+pub fn find<L: Link>(bus: &mut Bus<L>) -> Result<PreOpDevices, ErrorList> {
     let now_ns = bus.wire.link.now_ns();
     let found = bus.wire.run(bus.main.init_single_group(move || now_ns));
-    let devices: PreOpDevices = found.map_err(|error| match error {
-        Error::Timeout(_) if bus.main.num_subdevices() == 0 => {
-            "no device answers: look at cable and power of the drives, and at `interface`".to_string()
-        }
-        Error::Capacity(_) => format!("more than {MAX_DEVICES} devices on the bus"),
-        other => [vec![words(other)], refused_states(bus)].concat().join("\n"),
+    let devices: PreOpDevices = found.map_err(|error| {
+        ErrorList(vec![match error {
+            Error::Timeout(_) if bus.main.num_subdevices() == 0 => {
+                "no device answers: look at cable and power of the drives, and at `interface`".to_string()
+            }
+            Error::Capacity(_) => format!("more than {MAX_DEVICES} devices on the bus"),
+            other => [vec![words(other)], refused_states(bus)].concat().join("\n"),
+        }])
     })?;
     if devices.is_empty() {
-        return Err("no device on the bus: look at cable and power of the drives".to_string().into());
+        return Err(ErrorList(vec!["no device on the bus: look at cable and power of the drives".into()]));
     }
     Ok(devices)
 }
@@ -60,11 +52,9 @@ pub fn find<L: Link>(bus: &mut Bus<L>) -> Result<PreOpDevices, StartupErrors> {
 fn refused_states<L: Link>(bus: &mut Bus<L>) -> Vec<String> {
     let mut lines = vec![];
     for position in 0..bus.main.num_subdevices() as u16 {
-        let address = FIRST_ADDRESS + position;
-        let status =
-            bus.wire.run(Command::fprd(address, RegisterAddress::AlStatus.into()).receive::<u16>(&bus.main));
-        let code: Result<AlStatusCode, _> =
-            bus.wire.run(Command::fprd(address, RegisterAddress::AlStatusCode.into()).receive(&bus.main));
+        let read = |register: RegisterAddress| Command::fprd(FIRST_ADDRESS + position, register.into());
+        let status = bus.wire.run(read(RegisterAddress::AlStatus).receive::<u16>(&bus.main));
+        let code = bus.wire.run(read(RegisterAddress::AlStatusCode).receive::<AlStatusCode>(&bus.main));
         if let (Ok(status), Ok(code)) = (status, code)
             && status & 0x10 != 0
         {
@@ -79,7 +69,7 @@ pub fn bring_up<L: Link>(
     bus: &mut Bus<L>,
     mut devices: PreOpDevices,
     file: &DrivesFile,
-) -> Result<(OpDevices, SyncClock), StartupErrors> {
+) -> Result<(OpDevices, SyncClock), ErrorList> {
     let mut errors = vec![];
     for (number, leg) in (1..).zip(&file.legs) {
         if let Err(error) = configure(bus, &devices, leg, &file.bus) {
@@ -87,25 +77,24 @@ pub fn bring_up<L: Link>(
         }
     }
     if !errors.is_empty() {
-        return Err(StartupErrors(errors));
+        return Err(ErrorList(errors));
     }
-    let period = Duration::from_micros(file.bus.period_us.into());
+    let sync0_period = Duration::from_micros(file.bus.period_us.into());
     for mut device in devices.iter_mut(&bus.main) {
         device.set_dc_sync(DcSync::Sync0);
     }
-    let clocks =
-        DcConfiguration { start_delay: SYNC0_DELAY, sync0_period: period, sync0_shift: Duration::ZERO };
+    let clocks = DcConfiguration { start_delay: SYNC0_DELAY, sync0_period, sync0_shift: Duration::ZERO };
     let Bus { main, wire } = bus;
     let devices = wire.run(async {
         let devices = devices.into_pre_op_pdi(main).await?.configure_dc_sync(main, clocks).await?;
         devices.into_safe_op(main).await?.request_into_op(main).await
     });
     let devices = devices.map_err(|error| not_in(bus, "SAFE-OP", Some(error)))?;
-    let clock = reach_op(bus, &devices, file)?;
+    let clock = reach_op(bus, &devices, &file.bus).ok_or_else(|| not_in(bus, "OP", None))?;
     Ok((devices, clock))
 }
 
-fn not_in<L: Link>(bus: &mut Bus<L>, state: &str, error: Option<Error>) -> StartupErrors {
+fn not_in<L: Link>(bus: &mut Bus<L>, state: &str, error: Option<Error>) -> ErrorList {
     let mut lines = refused_states(bus);
     if let Some(code) = bus.wire.emergency.take() {
         lines.push(format!("a drive reported the emergency {code:#06x}"));
@@ -113,7 +102,7 @@ fn not_in<L: Link>(bus: &mut Bus<L>, state: &str, error: Option<Error>) -> Start
     if lines.is_empty() {
         lines.extend(error.map(words));
     }
-    StartupErrors(lines.into_iter().map(|line| format!("the drives do not reach {state}: {line}")).collect())
+    ErrorList(lines.into_iter().map(|line| format!("the drives do not reach {state}: {line}")).collect())
 }
 
 /// Mapping, mode, watchdog and the objects of the file.
@@ -137,7 +126,7 @@ fn configure<L: Link>(
     }
     writes.push(one(objects::MODE, 0, 1, CYCLIC_SYNCHRONOUS_TORQUE as u32));
     for write in writes {
-        bus.sdo_write(devices, position, write)?;
+        bus.objects(devices, position).write(write)?;
     }
     // The unit of the watchdog is 100 us by default.
     let wanted = timing.watchdog_ms as u16 * 10;
@@ -147,20 +136,14 @@ fn configure<L: Link>(
     let set: u16 = bus.wire.run(device.register_read(register)).map_err(words)?;
     let divider: u16 = bus.wire.run(device.register_read(RegisterAddress::WatchdogDivider)).map_err(words)?;
     if set != wanted || divider != 2498 {
-        return Err(format!(
-            "the watchdog is {set} units with divider {divider}, must be {wanted} with 2498"
-        ));
+        return Err(format!("the watchdog is {set} units of divider {divider}, must be {wanted} of 2498"));
     }
     Ok(())
 }
 
 /// Exchanges process data until all devices are in OP.
-fn reach_op<L: Link>(
-    bus: &mut Bus<L>,
-    devices: &OpDevices,
-    file: &DrivesFile,
-) -> Result<SyncClock, StartupErrors> {
-    let period_ns = u64::from(file.bus.period_us) * 1000;
+fn reach_op<L: Link>(bus: &mut Bus<L>, devices: &OpDevices, timing: &BusSection) -> Option<SyncClock> {
+    let period_ns = u64::from(timing.period_us) * 1000;
     let mut clock = SyncClock::new(period_ns, bus.wire.link.now_ns());
     for position in 0..devices.len() {
         if let Ok(device) = devices.subdevice(&bus.main, position) {
@@ -168,7 +151,7 @@ fn reach_op<L: Link>(
         }
     }
     for _ in 0..MAX_CYCLES_TO_OP {
-        let wake_ns = clock.next_sync0_ns() + u64::from(file.bus.shift_us) * 1000;
+        let wake_ns = clock.next_sync0_ns() + u64::from(timing.shift_us) * 1000;
         bus.wire.link.sleep_until(wake_ns);
         clock.advance_to(bus.wire.link.now_ns());
         let Bus { main, wire } = bus;
@@ -177,9 +160,9 @@ fn reach_op<L: Link>(
             let frame_ns = wire.sent_ns.midpoint(wire.received_ns);
             clock.update(frame_ns, response.extra.dc_system_time);
             if response.subdevice_states.iter().all(|state| *state == SubDeviceState::Op) {
-                return Ok(clock);
+                return Some(clock);
             }
         }
     }
-    Err(not_in(bus, "OP", None))
+    None
 }

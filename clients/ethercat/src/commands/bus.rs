@@ -128,7 +128,7 @@ pub fn zero(drives: &Path, leg: usize, length_m: f64) -> Result<(), Failure> {
     let position = section.position - 1;
     let found = inventory::identities(&mut bus, &devices);
     let identity = found.get(position).ok_or_else(|| before_start(format!("leg {leg}: no device")))?;
-    let counts = bus.sdo_value(&devices, position, objects::POSITION, 0).map_err(after_start)?;
+    let counts = bus.objects(&devices, position).value(objects::POSITION, 0).map_err(after_start)?;
     let offset_m = length_m - counts as f64 * section.units().metres_per_count();
     let values = [("serial", Some(identity.serial.to_string())), ("offset_m", Some(format!("{offset_m:?}")))];
     edit(drives, leg, &values)?;
@@ -177,7 +177,7 @@ pub fn read(drives: &Path, leg: usize, text: &str) -> Result<(), Failure> {
     let position = leg_section(&file, leg)?.position - 1;
     let frames = Frames::new();
     let (mut bus, devices) = pre_op(&frames, &file)?;
-    let value = bus.sdo_value(&devices, position, index, sub).map_err(after_start)?;
+    let value = bus.objects(&devices, position).value(index, sub).map_err(after_start)?;
     println!("{index:#06x}:{sub} = {value} ({value:#x})");
     Ok(())
 }
@@ -192,5 +192,5 @@ pub fn write(drives: &Path, leg: usize, text: &str, value: &str, bytes: u8) -> R
     let position = leg_section(&file, leg)?.position - 1;
     let frames = Frames::new();
     let (mut bus, devices) = pre_op(&frames, &file)?;
-    bus.sdo_write(&devices, position, SdoWrite { index, sub, bytes, value }).map_err(after_start)
+    bus.objects(&devices, position).write(SdoWrite { index, sub, bytes, value }).map_err(after_start)
 }

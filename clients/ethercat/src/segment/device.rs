@@ -1,4 +1,5 @@
-//! One simulated device: its EtherCAT controller (registers, sync managers, distributed clock), and the drive behind it. ETG1000.4, and the data sheet of the ET1100.
+//! One simulated device: its EtherCAT controller (registers, sync managers, distributed clock), and the drive behind it.
+//! ETG1000.4, and the data sheet of the ET1100.
 
 use super::application_layer::al_state::{INIT, OP, SAFE_OP};
 use super::local_clock::LocalClock;

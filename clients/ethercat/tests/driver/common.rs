@@ -2,12 +2,12 @@
 
 use hexad::config::Config;
 use hexad_ethercat::bus::{Bus, Frames};
-use hexad_ethercat::drives_file::DrivesFile;
+use hexad_ethercat::drives_file::{DrivesFile, ErrorList};
 use hexad_ethercat::inventory;
 use hexad_ethercat::segment::Segment;
 use hexad_ethercat::simulated_link::SimulatedLink;
 use hexad_ethercat::simulation;
-use hexad_ethercat::startup::{self, OpDevices, PreOpDevices, StartupErrors};
+use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
 use hexad_ethercat::sync_clock::SyncClock;
 
 pub const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
@@ -37,15 +37,15 @@ pub fn bus(frames: &Frames, segment: Segment) -> TestBus<'_> {
 }
 
 /// Devices in PRE-OP that agree with the file.
-pub fn checked(bus: &mut TestBus, file: &DrivesFile) -> Result<PreOpDevices, StartupErrors> {
+pub fn checked(bus: &mut TestBus, file: &DrivesFile) -> Result<PreOpDevices, ErrorList> {
     let devices = startup::find(bus)?;
     match inventory::contradictions(bus, &devices, file) {
         errors if errors.is_empty() => Ok(devices),
-        errors => Err(StartupErrors(errors)),
+        errors => Err(ErrorList(errors)),
     }
 }
 
-pub fn up(bus: &mut TestBus, file: &DrivesFile) -> Result<(OpDevices, SyncClock), StartupErrors> {
+pub fn up(bus: &mut TestBus, file: &DrivesFile) -> Result<(OpDevices, SyncClock), ErrorList> {
     let devices = checked(bus, file)?;
     startup::bring_up(bus, devices, file)
 }

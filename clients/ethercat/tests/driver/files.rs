@@ -69,7 +69,7 @@ fn objects_are_read_whatever_their_length() {
     let devices = startup::find(&mut bus).unwrap();
     for (index, value) in [(0x6072, 3000), (0x60c2, 1), (0x6076, 24_000), (0x60ff, 0)] {
         let sub = u8::from(index == 0x60c2);
-        match bus.sdo_value(&devices, 2, index, sub) {
+        match bus.objects(&devices, 2).value(index, sub) {
             Ok(found) => assert_eq!(found, value, "{index:#x}"),
             Err(error) => assert!(index == 0x60ff && error.contains("does not exist"), "{index:#x} {error}"),
         }

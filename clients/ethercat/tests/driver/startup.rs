@@ -106,7 +106,7 @@ const ROWS: &[Row] = &[
         |s| s.devices[0].is_watchdog_fixed = true,
         "",
         "",
-        &["leg 1: the watchdog is 1000 units with divider 2498, must be 200 with 2498"],
+        &["leg 1: the watchdog is 1000 units of divider 2498, must be 200 of 2498"],
     ),
     (
         "no PRE-OP",
