@@ -3,8 +3,12 @@
 //! | module | computes |
 //! | --- | --- |
 //! | [`cia402`], [`objects`], [`units`] | states and words of a drive, its objects, counts and lengths, torques and forces; they know no bus |
-//! | [`segment`] | six simulated drives, and the simulated platform that they move |
-//! | [`link`], [`simulated_link`], [`timer`] | Ethernet frames and their clock: real, or simulated |
+//! | [`drives_file`], [`file_edit`], [`machine_check`] | the file of the drives, changes of it, contradictions to the machine file |
+//! | [`segment`], [`simulation`] | six simulated drives with the simulated platform that they move, as a file describes them |
+//! | [`link`], [`raw_socket`], [`simulated_link`], [`timer`] | Ethernet frames and their clock: real, or simulated |
+//! | [`bus`], [`sdo`], [`inventory`], [`scan`], [`startup`] | main device, objects of drives, what is on the bus, the way to OP |
+//! | [`sync_clock`], [`process_image`], [`process_data`], [`leg_drive`] | grid of SYNC0, bytes of the process data, their exchange, one drive in it |
+//! | [`permission`], [`cycle`], [`topics`], [`jog`] | whether forces may be applied, the cycle with the daemon, motion of one leg |
 
 pub mod bus;
 pub mod cia402;
