@@ -4,6 +4,7 @@
 
 use crate::common;
 
+use std::fs;
 use std::process::Command;
 
 const UNITS: [&str; 2] = [
@@ -44,4 +45,24 @@ fn the_sandbox_is_tight() {
         };
         assert_eq!(code, Some(0), "{text}");
     }
+}
+
+/// The unit of a driver with the drop-in for drives on EtherCAT.
+#[test]
+fn the_unit_of_an_ethercat_driver_needs_little_more() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drop_in = folder.path().join("hexad-driver@.service.d");
+    fs::create_dir(&drop_in).expect("a folder");
+    let unit = folder.path().join("hexad-driver@.service");
+    fs::copy(UNITS[1], &unit).expect("a copy");
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/deploy/ethercat.conf");
+    fs::copy(source, drop_in.join("ethercat.conf")).expect("a copy");
+    let unit = unit.to_str().expect("a path");
+    let Some((text, code)) = systemd_analyze(&["verify", unit]) else { return };
+    assert_eq!((text.as_str(), code), ("", Some(0)));
+    let Some((text, code)) = systemd_analyze(&["security", "--offline=true", "--threshold=21", unit]) else {
+        return;
+    };
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("CAP_NET_RAW") && text.contains("hexad-driver@"), "{text}");
 }

@@ -1,0 +1,77 @@
+//! `run`: the driver of a machine.
+
+use std::path::Path;
+
+use hexad::realtime::allocation::calls_of_this_thread;
+use hexad::realtime::setup::{Shortfall, memory, scheduling};
+use hexad::realtime::stop_request::Stop;
+use hexad_ethercat::bus::Frames;
+use hexad_ethercat::cycle::Driver;
+use hexad_ethercat::machine_check;
+use hexad_ethercat::process_data::Exchange;
+use hexad_ethercat::topics::Topics;
+use tracing::{info, warn};
+
+use super::bus::{leave, operational};
+use super::{Failure, after_start, before_start, load_drives, load_machine, none_of};
+
+/// Below the daemon's priorities, 80 and 79.
+const PRIORITY: i32 = 70;
+/// Exchanges within which one must be complete.
+const FIRST_EXCHANGES: u32 = 10;
+/// Cycles in which the drives stop at the end: a quick stop, and the brakes.
+const END_CYCLES: u32 = 500;
+
+pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
+    let (file, machine) = (load_drives(drives)?, load_machine(machine)?);
+    none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
+    let stop = Stop::on_signals().map_err(before_start)?;
+    let topics = Topics::join(&machine.name).map_err(before_start)?;
+    memory::keep_heap();
+    let report = |result: Result<(), Shortfall>| result.unwrap_or_else(|shortfall| warn!("{shortfall}"));
+    report(memory::lock_all());
+    scheduling::set_shortest_timer_slack();
+    report(scheduling::fifo_priority(PRIORITY));
+    let frames = Frames::new();
+    let actuator = &machine.machine.actuator;
+    let middle_m = actuator.min_length.midpoint(actuator.max_length);
+    let (mut bus, devices, mut data) = operational(&frames, &file, middle_m)?;
+    // The first inputs; the host may lose a frame.
+    if (0..FIRST_EXCHANGES).all(|_| data.next_exchange(&mut bus, &devices) != Exchange::Complete) {
+        return Err(before_start("a drive is missing or has left OP"));
+    }
+    none_of(machine_check::lengths_outside(data.drives.map(|drive| drive.length_m()), &machine))?;
+    for (number, drive) in (1..).zip(&data.drives).filter(|(_, drive)| drive.state().is_fault()) {
+        warn!(
+            "leg {number} has the fault {:#06x}: `hexad clear` or reset acknowledges it",
+            drive.inputs().error_code
+        );
+    }
+    info!(name = %machine.name, "six drives in OP");
+    let mut driver = Driver::new(data, &file.bus, topics);
+    let allocations = calls_of_this_thread();
+    let outcome = loop {
+        if let Err(lost) = driver.cycle(&mut bus, &devices) {
+            break Err(after_start(lost));
+        }
+        if let Some(error) = driver.daemon.failure.take() {
+            break Err(after_start(error));
+        }
+        if stop.is_requested() {
+            break Ok(());
+        }
+    };
+    driver.end();
+    for _ in 0..END_CYCLES {
+        if driver.cycle(&mut bus, &devices).is_err() {
+            break;
+        }
+    }
+    let allocations = calls_of_this_thread() - allocations;
+    let lost_frames = driver.data.lost_frames;
+    info!(counts = ?driver.counts, lost_frames, late_frames = bus.wire.unmatched_frames, allocations, "the driver ends");
+    if outcome.is_ok() {
+        leave(bus, devices);
+    }
+    outcome
+}

@@ -1,0 +1,60 @@
+//! Contradictions between a drives file and a machine file.
+
+use hexad::config::Config;
+use hexad::model::LEGS;
+use hexad::realtime::cyclic::ReleaseMode;
+
+use crate::drives_file::DrivesFile;
+
+/// Everything in which the two files disagree.
+pub fn contradictions(file: &DrivesFile, machine: &Config) -> Vec<String> {
+    let actuator = &machine.machine.actuator;
+    let realtime = &machine.deployment.realtime;
+    let mut errors = vec![];
+    if machine.name != file.bus.name {
+        errors.push(format!("name = {:?}, the machine file has {:?}", file.bus.name, machine.name));
+    }
+    if realtime.release != ReleaseMode::External {
+        errors.push(
+            "the machine file needs [realtime] release = \"external\": the drives' clock releases the daemon"
+                .into(),
+        );
+    }
+    let period_us = realtime.period_s() * 1e6;
+    if (period_us - f64::from(file.bus.period_us)).abs() > 0.5 {
+        errors.push(format!("period_us = {}, the daemon's period is {period_us} us", file.bus.period_us));
+    }
+    for (number, leg) in (1..).zip(&file.legs) {
+        let force_n = leg.max_force_n();
+        if force_n < actuator.max_force {
+            errors.push(format!(
+                "leg[{number}]: {} thousandths of {} N m are {force_n:.0} N, less than actuator.max_force_n = {} N",
+                leg.max_torque_permille, leg.rated_torque_n_m, actuator.max_force
+            ));
+        }
+        let range_m = leg.units().metres_per_count().abs() * 2f64.powi(32);
+        if range_m <= actuator.max_length - actuator.min_length {
+            errors.push(format!(
+                "leg[{number}]: 32 bits of the encoder are {range_m:.3} m, less than the stroke"
+            ));
+        }
+    }
+    errors
+}
+
+/// Legs whose measured length is outside of the stroke. Encoders stop at the ends of the stroke within this tolerance \[m\].
+const STROKE_TOLERANCE_M: f64 = 0.005;
+
+/// Lengths outside of the stroke, in words.
+pub fn lengths_outside(lengths_m: [Option<f64>; LEGS], machine: &Config) -> Vec<String> {
+    let actuator = &machine.machine.actuator;
+    let (low, high) = (actuator.min_length - STROKE_TOLERANCE_M, actuator.max_length + STROKE_TOLERANCE_M);
+    let found = (1..).zip(lengths_m).filter_map(|(number, length_m)| {
+        let length_m = length_m.filter(|length_m| !(low..=high).contains(length_m))?;
+        let (low, high) = (actuator.min_length, actuator.max_length);
+        Some(format!(
+            "leg {number}: length {length_m:.4} m is outside of the stroke [{low}, {high}] m: measure its offset again (zero)"
+        ))
+    });
+    found.collect()
+}

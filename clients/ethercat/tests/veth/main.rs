@@ -1,0 +1,177 @@
+//! The commands over a veth pair, with the real daemon and with SOEM. Needs root and `ip`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+mod network;
+#[path = "../../../../tests/common/not_run.rs"]
+#[allow(dead_code, reason = "shared with the tests of hexad")]
+mod not_run;
+#[path = "../../../../tests/common/python.rs"]
+mod python;
+#[path = "../../../../tests/common/stalls.rs"]
+mod stalls;
+
+use std::sync::Mutex;
+use std::thread::sleep;
+use std::time::Duration;
+use std::{env, fs};
+
+use clap::Parser;
+use hexad::commands::CommandLine;
+use hexad::commands::log::{self, LogFormat};
+use network::{HEXAD_ARGUMENTS, Network};
+use stalls::Watchdog;
+
+const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
+
+/// One loop at a time: they are real-time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// Not a test: the command `hexad` as a process, without building it once more.
+#[test]
+#[ignore = "the other tests start it"]
+fn hexad_process() {
+    let arguments = env::var(HEXAD_ARGUMENTS).unwrap();
+    let command = CommandLine::parse_from(["hexad"].into_iter().chain(arguments.split(' ')));
+    log::install(LogFormat::Text);
+    if let Err(failure) = command.execute() {
+        panic!("{}", failure.message);
+    }
+}
+
+/// A network with the files of a machine of its own, and the simulated drives at one end of its cable.
+fn simulated(test: &str, options: &str) -> Option<Network> {
+    let mut network = match Network::new(test) {
+        Ok(network) => network,
+        Err(why) => {
+            not_run::lacking(&format!("a network namespace (root, ip): {why}"));
+            return None;
+        }
+    };
+    let machine =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/motion_base.toml")).unwrap();
+    let name = format!("\"{}\"", network.machine());
+    let sections = "\n[realtime]\nrelease = \"external\"\n[drive]\ndelay_us = 1000.0\n";
+    fs::write(network.path("m.toml"), machine.replace("\"motion_base\"", &name) + sections).unwrap();
+    fs::write(network.path("d.toml"), DRIVES.replace("\"motion_base\"", &name)).unwrap();
+    network.start("simulate", network.driver(&format!("simulate d.toml m.toml --interface ec1{options}")));
+    network.wait_for("simulate", "switched on", 1);
+    Some(network)
+}
+
+/// Whether the platform plays a motion to its end without a fault; after one it stands ready again.
+fn plays(network: &mut Network, motion: &str, seconds: u32) -> bool {
+    let faults = |network: &Network| network.log("daemon").matches("ERROR fault").count();
+    let before = faults(network);
+    let motion = format!("move --config m.toml --motion {motion} --seconds {seconds} --engage");
+    network.start("move", network.hexad(&motion));
+    while network.is_running("move") && faults(network) == before {
+        sleep(Duration::from_millis(50));
+    }
+    let has_fault = faults(network) > before;
+    if has_fault {
+        network.signal("move", libc::SIGKILL);
+        network.output(network.hexad("clear --config m.toml"));
+        sleep(Duration::from_secs(1));
+        network.output(network.hexad("goto --config m.toml --home --engage"));
+    }
+    !has_fault
+}
+
+#[test]
+fn the_daemon_drives_the_platform_over_the_bus() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut network) = simulated("run", "") else { return };
+    assert!(network.output(network.driver("check d.toml --machine m.toml")).contains("no error"));
+    network.start("daemon", network.hexad("run m.toml"));
+    network.start("run", network.driver("run d.toml m.toml"));
+    network.wait_for("run", "six drives in OP", 1);
+    let watchdog = Watchdog::start();
+    let seconds = if env::var_os("HEXAD_LONG").is_some() { 300 } else { 3 };
+    for motion in ["sines", "minimum-jerk"] {
+        let played = (0..3).any(|_| plays(&mut network, motion, seconds));
+        if !played {
+            let run = network.log("run");
+            // No cable loses frames here: it is the host that delays them.
+            let gap = watchdog.largest();
+            let is_host = run.contains("lost_frames=3") || gap > Duration::from_millis(1);
+            assert!(is_host, "{gap:?}\n{}", network.ends());
+            return not_run::not_run(
+                "the host pauses the processes of a loop of 1 kHz too long, three times in a row",
+            );
+        }
+    }
+    // Killed in motion: the watchdogs of the drives close the brakes.
+    let motion = "move --config m.toml --motion sines --seconds 60 --engage";
+    network.start("move", network.hexad(motion));
+    network.wait_for("move", "in control: moving", 1);
+    sleep(Duration::from_secs(2));
+    network.signal("run", libc::SIGKILL);
+    network.wait_for("simulate", "al_status=20 drive=Fault is_brake_open=false", 6);
+    network.wait_for("daemon", "code=101", 1);
+    // The same bus, started again; an operator clears the daemon's fault, and the drives' with it.
+    network.start("run", network.driver("run d.toml m.toml"));
+    network.wait_for("run", "six drives in OP", 1);
+    network.wait_for("run", "leg 6 has the fault 0x7500", 1);
+    network.output(network.hexad("clear --config m.toml"));
+    network.wait_for("run", "faults of drives are acknowledged", 1);
+    network.signal("move", libc::SIGINT);
+    sleep(Duration::from_millis(500));
+    network.output(network.hexad("goto --config m.toml --home --engage"));
+    network.start("move", network.hexad(motion));
+    network.wait_for("move", "in control: moving", 1);
+    sleep(Duration::from_secs(1));
+    // The daemon is killed: the forces expire.
+    let stops = network.log("simulate").matches("drive=QuickStop").count();
+    network.signal("daemon", libc::SIGKILL);
+    network.wait_for("simulate", "drive=QuickStop", stops + 6);
+    network.signal("run", libc::SIGINT);
+    network.wait_for("run", "the driver ends", 1);
+    println!("{}", network.log("run"));
+}
+
+#[test]
+fn commands_that_use_the_bus_for_a_moment() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(network) = simulated("jog", " --uncoupled") else { return };
+    let output = |arguments: &str| network.output(network.driver(arguments));
+    let refused = |arguments: &str| {
+        let ended = network.driver(arguments).output().unwrap();
+        assert!(!ended.status.success(), "{arguments}");
+        String::from_utf8_lossy(&ended.stderr).into_owned()
+    };
+    assert!(output("scan ec0").contains("serial = 106"));
+    assert_eq!(output("read d.toml 3 0x6076:0").trim(), "0x6076:0 = 24000 (0x5dc0)");
+    output("write d.toml 3 0x605a:0 6");
+    assert_eq!(output("read d.toml 3 0x605a").trim(), "0x605a:0 = 6 (0x6)");
+    assert!(refused("jog d.toml 3").contains("confirm with --unloaded"));
+    let file = fs::read_to_string(network.path("d.toml")).unwrap();
+    fs::write(network.path("d.toml"), file.replace("jogged_serial = 103\n", "")).unwrap();
+    assert!(refused("check d.toml").contains("leg 3: its direction was not checked"));
+    let text = output("jog d.toml 3 --unloaded");
+    assert!(text.contains("mm longer; look whether it is"), "{text}");
+    output("check d.toml");
+    // Another offset is written with the serial number of the drive.
+    output("zero d.toml 3 --length-m 1.75");
+    let file = fs::read_to_string(network.path("d.toml")).unwrap();
+    let leg = file.split("[[leg]]").nth(3).unwrap();
+    assert!(leg.contains("serial = 103") && leg.contains("offset_m = "), "{leg}");
+    output("reset d.toml");
+    assert!(refused("scan ec7").contains("interface ec7 does not exist"));
+    assert!(refused("scan lo").contains("no carrier"), "lo is down");
+    let mut busy = network.driver("simulate d.toml m.toml --interface ec1");
+    let text = String::from_utf8_lossy(&busy.output().unwrap().stderr).into_owned();
+    assert!(text.contains("another hexad-ethercat uses ec1"), "{text}");
+}
+
+#[test]
+fn soem_brings_the_drives_to_op() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let environment = match python::environment(&["pysoem==1.1.13".into()]) {
+        Ok(environment) => environment,
+        Err(why) => return not_run::lacking(&why),
+    };
+    let Some(network) = simulated("soem", "") else { return };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/veth/soem.py");
+    let text = network.output(network.command(&environment.join("bin/python"), &format!("{script} ec0")));
+    assert!(text.contains("working counter 18 of 18 enabled 6"), "{text}");
+}
