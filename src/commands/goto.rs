@@ -10,6 +10,7 @@ use clap::Args;
 
 use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
+use super::quantity::length_within;
 use super::target::pose_options::PoseOptions;
 use super::target::{
     Deviation, TargetError, TargetSource, constants, has_received, is_reached, pose_of, reference_x, target_x,
@@ -47,8 +48,8 @@ pub struct GotoArguments {
     /// Share of the limits of autonomous motions, for example 50%
     #[arg(long, value_name = "SHARE", default_value = "100%", value_parser = speed)]
     speed: f64,
-    /// Distance from the target at which the platform has arrived [m], instead of in_position.tolerance_m; the angle in proportion
-    #[arg(long, value_name = "M", value_parser = tolerance)]
+    /// Distance from the target at which the platform has arrived, with its unit, instead of in_position.tolerance_m; the angle in proportion
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Compute the way and its duration; move nothing. Without a daemon it begins at home
     #[arg(long)]
@@ -66,7 +67,7 @@ impl GotoArguments {
         if self.target.is_empty() && !self.home {
             return Err(Failure {
                 exit_code: 2,
-                message: "no target: give coordinates, for example --x-mm 100, or --home".into(),
+                message: "no target: give coordinates, for example --x 100mm, or --home".into(),
             });
         }
         let config = self.machine.load()?;
@@ -214,7 +215,7 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// Tolerance \[m\].
 fn tolerance(text: &str) -> Result<f64, String> {
-    number_within(text, 1e-9..=0.1, " m")
+    length_within(text, ["1nm", "100mm"])
 }
 
 /// Planned motion of the reference.
