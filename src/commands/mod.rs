@@ -61,6 +61,7 @@ pub mod log;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;
+pub mod orientation;
 pub mod plant;
 mod progress;
 mod quantity;

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use super::failure::CommandError;
+use super::orientation::OrientationFormat;
 use crate::analysis::pose_spline;
 use crate::model::task::TaskState;
 use crate::motion::trajectory::Knot;
 use crate::output::csv_table::{
-    NumberTable, TableError, TableErrors, derivative_columns, pose_columns, six, trajectory_columns,
+    NumberTable, TableError, TableErrors, derivative_columns, six, trajectory_columns,
 };
 use crate::output::files::name_of;
 
@@ -55,12 +56,18 @@ impl UnsolvedRows {
 /// X'' has no significant digits.
 const MIN_STEP_S: f64 = 1e-6;
 
-/// Reads a table of t, X, X', X''. If X' and X'' are missing, they are computed from the spline through the
-/// poses. Each row has the triple of Bryan angles nearest to that of the row before, the first nearest to `home`.
-pub fn read_trajectory(path: &Path, home: &[f64; 6]) -> Result<NumberTable, TableError> {
-    let mut table = NumberTable::read(path, &pose_columns(), &derivative_columns())?;
+/// Reads a table of t, X, X', X'', with orientations in a format. If X' and X'' are missing, they are computed from the spline
+/// through the poses. Each row has the triple of Bryan angles nearest to that of the row before, the first nearest to `home`.
+pub fn read_trajectory(
+    path: &Path,
+    format: OrientationFormat,
+    home: &[f64; 6],
+) -> Result<NumberTable, TableError> {
+    let table = NumberTable::read(path, &format.pose_columns(), &derivative_columns())?;
+    let path = name_of(path);
+    let mut table = format.in_task_coordinates(table, path, home)?;
     continue_angles(&mut table, home);
-    with_derivatives(table, name_of(path))
+    with_derivatives(table, path)
 }
 
 /// Chooses the triples of angles that continue each other: an angle that passes 180 deg does not jump.
@@ -75,7 +82,7 @@ fn continue_angles(table: &mut NumberTable, home: &[f64; 6]) {
 }
 
 /// The numbers of a row of a trajectory.
-fn numbers(Knot { t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
+pub fn numbers(Knot { t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
     [t].into_iter().chain([x, xd, xdd].into_iter().flat_map(<[f64; 6]>::from))
 }
 
@@ -128,6 +135,7 @@ pub fn task_state(row: &[f64]) -> TaskState {
 mod tests {
     use super::*;
     use crate::motion::minimum_jerk::rise;
+    use crate::output::csv_table::pose_columns;
     use core::f64::consts::{FRAC_PI_2, PI};
 
     /// Table of a motion that begins at the angles `start`, each row with its own triple of angles.
@@ -139,7 +147,8 @@ mod tests {
         }
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(&file, text).unwrap();
-        read_trajectory(file.path(), &[start[0], start[1], start[2], 0.0, 0.0, 0.65]).unwrap()
+        read_trajectory(file.path(), OrientationFormat::OF_X, &[start[0], start[1], start[2], 0.0, 0.0, 0.65])
+            .unwrap()
     }
 
     /// As in a live stream, where poses are compared: another triple of the same orientation changes no motion.

@@ -150,7 +150,7 @@ fn headers_of_other_programs_are_read() {
 fn what_is_not_read_is_one_sentence() {
     let read =
         |text: &str| NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &pose_columns(), &[]);
-    let angles = "with R = Rx(alpha) Ry(beta) Rz(gamma)";
+    let angles = "with R = Rx(alpha) Ry(beta) Rz(gamma); --rotation names another order or quaternions";
     for (text, wanted) in [
         (
             "Time (s),Roll (deg),Pitch (deg),Yaw (deg),X (mm),Y (cm),Z (mm)\n0,0,0,0,0,0,650\n",
