@@ -26,7 +26,7 @@ use crate::model::rigid::Twist;
 use crate::operator::protocol::AnswerLine;
 use crate::operator::requests::status;
 use crate::output::files::print;
-use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, percent, significant};
+use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed, percent, significant};
 use crate::realtime::stop_request::Stop;
 
 /// Longest time of the motion, as a multiple of the computed time, and an addition \[s\].
@@ -81,6 +81,7 @@ impl GotoArguments {
         if self.dry_run {
             return Ok(print(Plan {
                 constants: &constants,
+                digits: MotionDigits::new(config.resolution()),
                 window: &window,
                 from: &from,
                 origin,
@@ -193,12 +194,11 @@ fn too_late(source: &TargetSource, x: &[f64; 6], window: &InPositionWindow, long
 fn arrived(source: &TargetSource, since: Instant, error: Twist) -> Result<(), TargetError> {
     let (elapsed_s, answer) = (since.elapsed().as_secs_f64(), source.status().newest.1);
     let report = answer.status.unwrap_or_default();
-    let (pose, [shortest, longest]) = (report.pose.unwrap_or_default(), report.stroke_m);
     let text = format!(
         "in position after {elapsed_s:.2} s, {} from the target; the platform stands under control\n{}{}",
         Deviation(error),
         heading(),
-        row("pose", &pose, motion_digits(longest - shortest))
+        row("pose", &report.pose.unwrap_or_default(), MotionDigits::new(report.resolution))
     );
     // The platform has moved, so a closed standard output is not a failure.
     let _ = print(text);
@@ -222,6 +222,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 struct Plan<'a> {
     window: &'a InPositionWindow,
     constants: &'a Constants,
+    digits: MotionDigits,
     from: &'a [f64; 6],
     origin: &'static str,
     to: &'a [f64; 6],
@@ -231,11 +232,11 @@ struct Plan<'a> {
 
 impl fmt::Display for Plan<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { constants, window, from, origin, to, speed, motion } = self;
+        let Self { constants, digits, window, from, origin, to, speed, motion } = self;
         let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
-        let digits = motion_digits(actuator.stroke());
-        let rows = row("from", from, digits) + &row("to", to, digits);
+        let rows = row("from", from, *digits) + &row("to", to, *digits);
+        let digits = digits.mm;
         writeln!(f, "{}{rows}from is {origin}", heading())?;
         writeln!(
             f,
@@ -280,9 +281,12 @@ impl fmt::Display for Plan<'_> {
 }
 
 /// Line with X in millimetres and degrees.
-fn row(name: &str, x: &[f64; 6], digits: usize) -> String {
-    let numbers: String =
-        x.iter().enumerate().map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, digits))).collect();
+fn row(name: &str, x: &[f64; 6], digits: MotionDigits) -> String {
+    let numbers: String = x
+        .iter()
+        .enumerate()
+        .map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, digits.of_axis(k))))
+        .collect();
     format!("{name:10}{numbers}\n")
 }
 

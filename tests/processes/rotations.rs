@@ -228,5 +228,5 @@ fn orientations_that_have_no_meaning_are_refused() {
     }
     let ended = run(&machine, &["move", "--config", &config, "--motion", "circle", "--rotation", "zyx"]);
     assert_eq!(ended.status.code(), Some(2));
-    assert!(ended.stderr.contains("--trajectory <FILE>"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("cannot be used with"), "{}", ended.stderr);
 }

@@ -162,6 +162,21 @@ fn a_dry_run_needs_no_daemon() {
     assert!(duration_s > 0.45 && duration_s < 1.2 * 0.46 + 0.1, "{duration}");
 }
 
+/// Steps of a machine with a stroke of 0.1 mm, and of one with 28 mm, have digits on the screen.
+#[test]
+fn a_small_step_is_seen() {
+    let machine = Machine::patient("digits");
+    for (name, alpha, z) in [("piezo", "0.000833", "135.005000"), ("telescope_m2", "0.00083", "-702.9950")] {
+        let file = format!("{}/tests/data/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let step = ["goto", "--config", &file, "--relative", "--z", "5um", "--alpha", "3arcsec", "--dry-run"];
+        let Ended { status, stdout, stderr } = run(&machine, &step);
+        assert_eq!(status.code(), Some(0), "{stderr}");
+        let to = stdout.lines().find(|line| line.starts_with("to ")).expect("a target");
+        let to: Vec<_> = to.split_whitespace().collect();
+        assert_eq!([to[1], to[6]], [alpha, z], "{name}: {stdout}");
+    }
+}
+
 #[test]
 fn a_slower_goto_takes_longer() {
     let machine = Machine::patient("speed");

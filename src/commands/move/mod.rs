@@ -54,7 +54,7 @@ pub struct MoveArguments {
     machine: MachineFile,
     #[command(flatten)]
     source: TrajectorySource,
-    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), requires = "trajectory")]
+    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "pause", "resume"])]
     rotation: OrientationFormat,
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]

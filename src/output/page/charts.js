@@ -82,7 +82,7 @@ function legendOf(panel, series, toggle) {
     table.append(element("tr", {}, element("td", {}, button), ...cells));
     return cells;
   });
-  const least = { "[m]": HEAD.machine.digits, "[deg]": HEAD.machine.digits - 1 }[panel.label.split(" ").pop()];
+  const least = { "[m]": HEAD.machine.m_digits, "[deg]": HEAD.machine.deg_digits }[panel.label.split(" ").pop()];
   const show = (sample) => rows.forEach((cells, k) => cells.forEach((cell, which) => {
     cell.textContent = rounded(sample(series[k + which * panel.names.length].column), least);
   }));
