@@ -8,7 +8,7 @@ use crate::analysis::pose_spline;
 use crate::model::task::TaskState;
 use crate::motion::trajectory::Knot;
 use crate::output::csv_table::{
-    NumberTable, TableError, TableErrors, derivative_columns, six, trajectory_columns,
+    NumberTable, TableError, TableErrors, derivative_columns, pose_columns, six, trajectory_columns,
 };
 use crate::output::files::name_of;
 
@@ -65,9 +65,36 @@ pub fn read_trajectory(
 ) -> Result<NumberTable, TableError> {
     let table = NumberTable::read(path, &format.pose_columns(), &derivative_columns())?;
     let path = name_of(path);
-    let mut table = format.in_task_coordinates(table, path, home)?;
+    let mut table = in_task_coordinates(table, format, path, home)?;
     continue_angles(&mut table, home);
     with_derivatives(table, path)
+}
+
+/// The rows of a table with orientations in a format as rows of X.
+fn in_task_coordinates(
+    table: NumberTable,
+    format: OrientationFormat,
+    path: &Path,
+    home: &[f64; 6],
+) -> Result<NumberTable, TableError> {
+    if format == OrientationFormat::OF_X {
+        return Ok(table);
+    }
+    let mut errors = TableErrors::new(path);
+    let (mut near, mut rows) = (*home, vec![]);
+    let [found, needed] = [format.pose_columns(), pose_columns()].map(|columns| columns.len());
+    for (row, line) in table.rows().iter().zip(table.lines()) {
+        let has_derivatives = row.len() > found;
+        match format.state(row, has_derivatives, &near) {
+            Ok(state) => {
+                near = state.x.into();
+                let width = if has_derivatives { usize::MAX } else { needed };
+                rows.push(numbers(Knot { t: time(row), state }).take(width).collect());
+            }
+            Err(error) => errors.add(format!("line {line}: {error}")),
+        }
+    }
+    errors.into_result().map(|()| table.with_rows(rows))
 }
 
 /// Chooses the triples of angles that continue each other: an angle that passes 180 deg does not jump.
@@ -82,7 +109,7 @@ fn continue_angles(table: &mut NumberTable, home: &[f64; 6]) {
 }
 
 /// The numbers of a row of a trajectory.
-pub fn numbers(Knot { t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
+fn numbers(Knot { t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
     [t].into_iter().chain([x, xd, xdd].into_iter().flat_map(<[f64; 6]>::from))
 }
 
@@ -135,7 +162,6 @@ pub fn task_state(row: &[f64]) -> TaskState {
 mod tests {
     use super::*;
     use crate::motion::minimum_jerk::rise;
-    use crate::output::csv_table::pose_columns;
     use core::f64::consts::{FRAC_PI_2, PI};
 
     /// Table of a motion that begins at the angles `start`, each row with its own triple of angles.

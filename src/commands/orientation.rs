@@ -1,15 +1,11 @@
 //! `--rotation`: how a table states the orientation of the platform, and its rows in X.
 
-use std::path::Path;
-
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::offline_tables::{numbers, task_state, time};
 use crate::model::rigid::Pose;
 use crate::model::task::{TaskState, task_coordinates};
 use crate::motion::rotation_order::{RotationOrder, quaternion_of, rotation_of};
-use crate::motion::trajectory::Knot;
-use crate::output::csv_table::{NumberTable, TableError, TableErrors, pose_columns, six};
+use crate::output::csv_table::{pose_columns, six};
 
 /// Help text of the option.
 pub const ROTATION_HELP: &str = "Orientations in the table: an order of the rotations, as zyx for R = Rz(gamma) \
@@ -51,44 +47,16 @@ impl OrientationFormat {
         }
     }
 
-    /// A table with poses of this format, and X' and X'' if it has them, as a table of X, each row near the row before. Error
-    /// texts use the name `path`.
-    pub fn in_task_coordinates(
-        self,
-        table: NumberTable,
-        path: &Path,
-        home: &[f64; 6],
-    ) -> Result<NumberTable, TableError> {
-        if self == Self::OF_X {
-            return Ok(table);
-        }
-        let mut errors = TableErrors::new(path);
-        let (mut near, mut rows) = (*home, vec![]);
-        let poses = self.pose_columns().len();
-        for (row, line) in table.rows().iter().zip(table.lines()) {
-            let has_derivatives = row.len() > poses;
-            match self.state(row, has_derivatives, &near) {
-                Ok(state) => {
-                    near = state.x.into();
-                    let all = numbers(Knot { t: time(row), state });
-                    rows.push(if has_derivatives {
-                        all.collect()
-                    } else {
-                        all.take(pose_columns().len()).collect()
-                    });
-                }
-                Err(error) => errors.add(format!("line {line}: {error}")),
-            }
-        }
-        errors.into_result().map(|()| table.with_rows(rows))
-    }
-
-    /// X of a row, with X' and X'' if it has these.
-    fn state(self, row: &[f64], has_derivatives: bool, near: &[f64; 6]) -> Result<TaskState, String> {
+    /// X of a row, with X' and X'' if it has these, with the triple of Bryan angles nearest to `near`.
+    pub fn state(self, row: &[f64], has_derivatives: bool, near: &[f64; 6]) -> Result<TaskState, String> {
         let at_rest = |pose: &Pose| TaskState::at_rest(task_coordinates(pose, near));
         match self {
             Self::Angles(order) => {
-                let motion = order.motion(&task_state(row));
+                let motion = order.motion(&TaskState {
+                    x: six(row, 1).into(),
+                    xd: six(row, 7).into(),
+                    xdd: six(row, 13).into(),
+                });
                 if !has_derivatives {
                     return Ok(at_rest(&motion.pose));
                 }
