@@ -98,6 +98,8 @@
 //! | replay | computing the cycles of a recording again, compared bit for bit |
 //! | replica | controller that repeats every cycle in the recorder, so that the recorder has its internal state |
 //! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
+//! | resolution | smallest length and angle of a machine that are worth showing, by the noise of its lengths and its size |
+//! | rotation order | order in which the rotations by alpha, beta and gamma are multiplied, see [`motion::rotation_order`] |
 //! | sample | pose of a motion at one instant, without derivatives, see [`control::setpoint::pose_samples`] |
 //! | saturation | a quantity held at its limit |
 //! | setpoint | X, X', X'' that a source requests for an instant; or samples of X, or one X to hold |

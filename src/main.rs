@@ -3,7 +3,6 @@
 use std::env;
 use std::process::ExitCode;
 
-use clap::Parser;
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::{CommandLine, log};
 use hexad::realtime::allocation::CountingAllocator;
@@ -17,7 +16,7 @@ fn main() -> ExitCode {
     if parent.is_some_and(|parent| !stop_with_parent(parent)) {
         return ExitCode::SUCCESS;
     }
-    let command = CommandLine::parse();
+    let command = CommandLine::from_arguments();
     log::install(command.log_format);
     match command.execute() {
         Ok(()) => ExitCode::SUCCESS,

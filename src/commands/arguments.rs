@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
 use crate::config::{Config, ConfigError};
 
 /// Configuration of demonstrations and diagnoses without `--config`.
@@ -65,6 +66,8 @@ pub struct TableFiles {
     /// CSV to write; `-` is standard output
     #[arg(long, value_name = "FILE")]
     pub output: PathBuf,
+    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name())]
+    pub rotation: OrientationFormat,
 }
 
 /// Duration \[s\] of a motion, a wait or a measurement.

@@ -10,6 +10,7 @@ use clap::Args;
 
 use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
+use super::quantity::length_within;
 use super::target::pose_options::PoseOptions;
 use super::target::{
     Deviation, TargetError, TargetSource, constants, has_received, is_reached, pose_of, reference_x, target_x,
@@ -25,7 +26,7 @@ use crate::model::rigid::Twist;
 use crate::operator::protocol::AnswerLine;
 use crate::operator::requests::status;
 use crate::output::files::print;
-use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, percent, significant};
+use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed, percent, significant};
 use crate::realtime::stop_request::Stop;
 
 /// Longest time of the motion, as a multiple of the computed time, and an addition \[s\].
@@ -47,8 +48,8 @@ pub struct GotoArguments {
     /// Share of the limits of autonomous motions, for example 50%
     #[arg(long, value_name = "SHARE", default_value = "100%", value_parser = speed)]
     speed: f64,
-    /// Distance from the target at which the platform has arrived [m], instead of in_position.tolerance_m; the angle in proportion
-    #[arg(long, value_name = "M", value_parser = tolerance)]
+    /// Distance from the target at which the platform has arrived, with its unit, instead of in_position.tolerance_m; the angle in proportion
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Compute the way and its duration; move nothing. Without a daemon it begins at home
     #[arg(long)]
@@ -66,7 +67,7 @@ impl GotoArguments {
         if self.target.is_empty() && !self.home {
             return Err(Failure {
                 exit_code: 2,
-                message: "no target: give coordinates, for example --x-mm 100, or --home".into(),
+                message: "no target: give coordinates, for example --x 100mm, or --home".into(),
             });
         }
         let config = self.machine.load()?;
@@ -80,6 +81,7 @@ impl GotoArguments {
         if self.dry_run {
             return Ok(print(Plan {
                 constants: &constants,
+                digits: MotionDigits::new(config.resolution()),
                 window: &window,
                 from: &from,
                 origin,
@@ -192,12 +194,11 @@ fn too_late(source: &TargetSource, x: &[f64; 6], window: &InPositionWindow, long
 fn arrived(source: &TargetSource, since: Instant, error: Twist) -> Result<(), TargetError> {
     let (elapsed_s, answer) = (since.elapsed().as_secs_f64(), source.status().newest.1);
     let report = answer.status.unwrap_or_default();
-    let (pose, [shortest, longest]) = (report.pose.unwrap_or_default(), report.stroke_m);
     let text = format!(
         "in position after {elapsed_s:.2} s, {} from the target; the platform stands under control\n{}{}",
         Deviation(error),
         heading(),
-        row("pose", &pose, motion_digits(longest - shortest))
+        row("pose", &report.pose.unwrap_or_default(), MotionDigits::new(report.resolution))
     );
     // The platform has moved, so a closed standard output is not a failure.
     let _ = print(text);
@@ -214,13 +215,14 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// Tolerance \[m\].
 fn tolerance(text: &str) -> Result<f64, String> {
-    number_within(text, 1e-9..=0.1, " m")
+    length_within(text, ["1nm", "100mm"])
 }
 
 /// Planned motion of the reference.
 struct Plan<'a> {
     window: &'a InPositionWindow,
     constants: &'a Constants,
+    digits: MotionDigits,
     from: &'a [f64; 6],
     origin: &'static str,
     to: &'a [f64; 6],
@@ -230,11 +232,11 @@ struct Plan<'a> {
 
 impl fmt::Display for Plan<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { constants, window, from, origin, to, speed, motion } = self;
+        let Self { constants, digits, window, from, origin, to, speed, motion } = self;
         let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
-        let digits = motion_digits(actuator.stroke());
-        let rows = row("from", from, digits) + &row("to", to, digits);
+        let rows = row("from", from, *digits) + &row("to", to, *digits);
+        let digits = digits.mm;
         writeln!(f, "{}{rows}from is {origin}", heading())?;
         writeln!(
             f,
@@ -279,9 +281,12 @@ impl fmt::Display for Plan<'_> {
 }
 
 /// Line with X in millimetres and degrees.
-fn row(name: &str, x: &[f64; 6], digits: usize) -> String {
-    let numbers: String =
-        x.iter().enumerate().map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, digits))).collect();
+fn row(name: &str, x: &[f64; 6], digits: MotionDigits) -> String {
+    let numbers: String = x
+        .iter()
+        .enumerate()
+        .map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, digits.of_axis(k))))
+        .collect();
     format!("{name:10}{numbers}\n")
 }
 

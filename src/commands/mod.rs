@@ -27,6 +27,7 @@ use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::record::RecordArguments;
 use self::recover::RecoverArguments;
+use self::renamed_options::with_new_form;
 use self::replay::ReplayArguments;
 use self::report::ReportArguments;
 use self::request::{EngageArguments, RequestArguments, StopArguments};
@@ -60,10 +61,13 @@ pub mod log;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;
+pub mod orientation;
 pub mod plant;
 mod progress;
+mod quantity;
 mod record;
 mod recover;
+mod renamed_options;
 mod replay;
 mod report;
 mod request;
@@ -153,6 +157,11 @@ enum CommandArguments {
 }
 
 impl CommandLine {
+    /// The command line of this process. If it is wrong, the process ends here, with the reason.
+    pub fn from_arguments() -> Self {
+        Self::try_parse().map_err(with_new_form).unwrap_or_else(|error| error.exit())
+    }
+
     /// Executes the command.
     pub fn execute(self) -> Result<(), Failure> {
         use CommandArguments as Is;

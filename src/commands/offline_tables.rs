@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::failure::CommandError;
+use super::orientation::OrientationFormat;
 use crate::analysis::pose_spline;
 use crate::model::task::TaskState;
 use crate::motion::trajectory::Knot;
@@ -55,12 +56,45 @@ impl UnsolvedRows {
 /// X'' has no significant digits.
 const MIN_STEP_S: f64 = 1e-6;
 
-/// Reads a table of t, X, X', X''. If X' and X'' are missing, they are computed from the spline through the
-/// poses. Each row has the triple of Bryan angles nearest to that of the row before, the first nearest to `home`.
-pub fn read_trajectory(path: &Path, home: &[f64; 6]) -> Result<NumberTable, TableError> {
-    let mut table = NumberTable::read(path, &pose_columns(), &derivative_columns())?;
+/// Reads a table of t, X, X', X'', with orientations in a format. If X' and X'' are missing, they are computed from the spline
+/// through the poses. Each row has the triple of Bryan angles nearest to that of the row before, the first nearest to `home`.
+pub fn read_trajectory(
+    path: &Path,
+    format: OrientationFormat,
+    home: &[f64; 6],
+) -> Result<NumberTable, TableError> {
+    let table = NumberTable::read(path, &format.pose_columns(), &derivative_columns())?;
+    let path = name_of(path);
+    let mut table = in_task_coordinates(table, format, path, home)?;
     continue_angles(&mut table, home);
-    with_derivatives(table, name_of(path))
+    with_derivatives(table, path)
+}
+
+/// The rows of a table with orientations in a format as rows of X.
+fn in_task_coordinates(
+    table: NumberTable,
+    format: OrientationFormat,
+    path: &Path,
+    home: &[f64; 6],
+) -> Result<NumberTable, TableError> {
+    if format == OrientationFormat::OF_X {
+        return Ok(table);
+    }
+    let mut errors = TableErrors::new(path);
+    let (mut near, mut rows) = (*home, vec![]);
+    let [found, needed] = [format.pose_columns(), pose_columns()].map(|columns| columns.len());
+    for (row, line) in table.rows().iter().zip(table.lines()) {
+        let has_derivatives = row.len() > found;
+        match format.state(row, has_derivatives, &near) {
+            Ok(state) => {
+                near = state.x.into();
+                let width = if has_derivatives { usize::MAX } else { needed };
+                rows.push(numbers(Knot { t: time(row), state }).take(width).collect());
+            }
+            Err(error) => errors.add(format!("line {line}: {error}")),
+        }
+    }
+    errors.into_result().map(|()| table.with_rows(rows))
 }
 
 /// Chooses the triples of angles that continue each other: an angle that passes 180 deg does not jump.
@@ -139,7 +173,8 @@ mod tests {
         }
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(&file, text).unwrap();
-        read_trajectory(file.path(), &[start[0], start[1], start[2], 0.0, 0.0, 0.65]).unwrap()
+        read_trajectory(file.path(), OrientationFormat::OF_X, &[start[0], start[1], start[2], 0.0, 0.0, 0.65])
+            .unwrap()
     }
 
     /// As in a live stream, where poses are compared: another triple of the same orientation changes no motion.

@@ -42,6 +42,9 @@ const MAX_VIOLATIONS: usize = 100;
 /// Largest length of `name`; iceoryx2 allows 255 characters in the name of a service, which contains more than this.
 const MAX_NAME_LENGTH: usize = 64;
 
+/// Bounds of the resolution over the stroke: 750 mm are shown in steps of 0.75 um to 7.5 um.
+const RESOLUTION_PER_STROKE: [f64; 2] = [1e-6, 1e-5];
+
 /// Validated configuration file.
 #[derive(Clone, Debug)]
 pub struct Config {
@@ -128,6 +131,14 @@ impl Config {
             }
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
+    }
+
+    /// Smallest length and angle of the machine that are worth showing \[m\], \[rad\]: the noise of a length, within bounds by the
+    /// stroke; and the turn that moves a joint of the platform so far.
+    pub fn resolution(&self) -> [f64; 2] {
+        let [finest, coarsest] = RESOLUTION_PER_STROKE.map(|share| share * self.machine.actuator.stroke());
+        let length_m = self.deployment.noise.length_m.clamp(finest, coarsest);
+        [length_m, length_m / self.machine.joints.radius]
     }
 
     /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.

@@ -14,6 +14,9 @@ use super::rigid::{Acceleration, Motion, Pose, Twist};
 /// Cosine of beta up to which only the sum or the difference of alpha and gamma is determined.
 const MIN_COS_BETA: f64 = 1e-12;
 
+/// Cosine of beta from which on alpha and gamma have derivatives: rounding of omega is a part of 1e-10 of them.
+const MIN_COS_BETA_IN_MOTION: f64 = 1e-6;
+
 /// Motion in task coordinates at one instant: Bryan angles \[rad\], position \[m\], and their time derivatives.
 ///
 /// X' and X'' hold angle rates, not angular velocity:
@@ -80,6 +83,29 @@ impl TaskState {
                 linear: Vector3::new(ax, ay, az),
             },
         }
+    }
+
+    /// State of a motion, the inverse of [`TaskState::motion`], with the triple of Bryan angles nearest to `near`. None near
+    /// beta = +-90 deg, where alpha and gamma have no derivatives.
+    ///
+    /// Conditioning: errors of the derivatives of alpha and gamma grow with `1 / cos(beta)`.
+    pub fn of_motion(motion: &Motion, near: &[f64; 6]) -> Option<Self> {
+        let x = task_coordinates(&motion.pose, near);
+        let [alpha, beta, ..] = x;
+        let [(sa, ca), (sb, cb)] = [alpha, beta].map(libm::sincos);
+        // E^-1 times a vector.
+        let rates = |omega: Vector3<f64>| {
+            let gamma_rate = (ca * omega.z - sa * omega.y) / cb;
+            Vector3::new(omega.x - sb * gamma_rate, ca * omega.y + sa * omega.z, gamma_rate)
+        };
+        let joined = |angular: Vector3<f64>, linear: Vector3<f64>| {
+            Vector6::new(angular.x, angular.y, angular.z, linear.x, linear.y, linear.z)
+        };
+        let xd = joined(rates(motion.twist.angular), motion.twist.linear);
+        // What omega' is of these rates alone.
+        let steady = Self { x: x.into(), xd, xdd: Vector6::zeros() }.motion().acceleration.angular;
+        let xdd = joined(rates(motion.acceleration.angular - steady), motion.acceleration.linear);
+        (cb.abs() >= MIN_COS_BETA_IN_MOTION).then_some(Self { x: x.into(), xd, xdd })
     }
 
     /// The same motion with the triple of Bryan angles nearest to `near`, as of [`task_coordinates`]. Where only the sum or the
@@ -206,6 +232,9 @@ mod tests {
             assert!((a.pose.rotation - b.pose.rotation).amax() < 1e-14);
             assert!((a.twist.vector() - b.twist.vector()).amax() < 1e-14);
             assert!((a.acceleration.vector() - b.acceleration.vector()).amax() < 1e-13);
+            let again = TaskState::of_motion(&a, &near).unwrap();
+            assert!((again.x - nearest.x).amax() < 1e-14 && (again.xd - nearest.xd).amax() < 1e-13);
+            assert!((again.xdd - nearest.xdd).amax() < 1e-12, "{}", again.xdd - nearest.xdd);
         }
         let locked = TaskState::at_rest([1.0, FRAC_PI_2, 0.5, 0.0, 0.0, 1.0]);
         let nearest = locked.nearest_to(&[0.7, 1.5, 0.8, 0.0, 0.0, 1.0]);
@@ -214,5 +243,6 @@ mod tests {
             "{}",
             nearest.x
         );
+        assert_eq!(TaskState::of_motion(&locked.motion(), &locked.x.into()), None);
     }
 }

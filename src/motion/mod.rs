@@ -5,5 +5,6 @@
 pub mod built_in;
 pub mod excitation;
 pub mod minimum_jerk;
+pub mod rotation_order;
 pub mod timeline;
 pub mod trajectory;

@@ -52,6 +52,9 @@ pub struct StatusReport {
     pub legs: Vec<LegReport>,
     /// `actuator.min_length_m` and `actuator.max_length_m`.
     pub stroke_m: [f64; 2],
+    /// Smallest length and angle that are worth showing \[m\], \[rad\]; from the noise of the lengths and the size of the machine.
+    #[serde(default)]
+    pub resolution: [f64; 2],
     /// `actuator.max_force_n`.
     pub max_force_n: f64,
     /// Senders of the inputs.

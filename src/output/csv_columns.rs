@@ -1,17 +1,12 @@
-//! Columns of a CSV table by name, in SI units or in another that the name ends with: `x` or `x_mm`, `t_ms`, `alpha_deg`,
+//! Columns of a CSV table by name, in SI units or in another that the name ends with: `x` or `x_um`, `t_ms`, `alpha_arcsec`,
 //! `x_rate_mm_s`, `alpha_accel_deg_s2`, `length_1_mm`, `length_rate_1_mm_s`; or in brackets: `x [mm]`, `x_rate (mm/s)`.
 
 use super::excerpt::excerpt;
 use super::numbers::AXES;
+use super::units::{ANGLES, LENGTHS, TIMES, in_letters};
 
-/// Units of a time, a length and an angle, with their factors to SI.
-const TIMES: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
-const LENGTHS: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
-const ANGLES: [(&str, f64); 3] = [("rad", 1.0), ("mrad", 1e-3), ("deg", core::f64::consts::PI / 180.0)];
-
-/// Spellings in units of characters that no name has.
-const SPELLINGS: [(&str, &str); 6] =
-    [("/", "_"), ("^", ""), ("²", "2"), ("°", "deg"), ("µ", "u"), ("μ", "u")];
+/// What units of quotients are written with, and the text in the place of it.
+const QUOTIENTS: [(&str, &str); 3] = [("/", "_"), ("^", ""), ("²", "2")];
 
 /// Other words for columns, only to show a header: angles of other names may be of another order of rotations.
 const WORDS: [(&str, &str); 4] = [("t", "time"), ("alpha", "roll"), ("beta", "pitch"), ("gamma", "yaw")];
@@ -44,7 +39,7 @@ pub(super) fn find(header: &[String], name: &str) -> Vec<Column> {
 /// Factor from a unit of a column to SI; none if it is not one of its units.
 pub(super) fn factor(name: &str, unit: &str) -> Option<f64> {
     let unit = in_brackets(unit).unwrap_or(unit);
-    let unit = SPELLINGS.iter().fold(unit.to_string(), |unit, (from, to)| unit.replace(from, to));
+    let unit = QUOTIENTS.iter().fold(in_letters(unit), |unit, (from, to)| unit.replace(from, to));
     units(name).into_iter().find(|(known, _)| *known == unit).map(|(_, factor)| factor)
 }
 
@@ -109,10 +104,10 @@ fn respelled(found: &str, name: &str) -> Option<String> {
 fn units(name: &str) -> Vec<(String, f64)> {
     let order = if name.contains("_rate") { 1 } else { usize::from(name.contains("_accel")) * 2 };
     let stem = name.split('_').next().unwrap_or_default();
-    let base: &[(&str, f64)] = match (stem, AXES.iter().position(|axis| *axis == stem)) {
-        ("t", _) => &TIMES,
-        ("length", _) | (_, Some(3..)) => &LENGTHS,
-        (_, Some(_)) => &ANGLES,
+    let base = match (stem, AXES.iter().position(|axis| *axis == stem)) {
+        ("t", _) => TIMES,
+        ("length", _) | (_, Some(3..)) => LENGTHS,
+        (_, Some(_)) => ANGLES,
         _ => &[],
     };
     let per = ["", "_s", "_s2"].get(order).copied().unwrap_or_default();
@@ -165,6 +160,10 @@ mod tests {
             "gamma_accel_deg_s2",
             "length_3_mm",
             "length_rate_3_mm_s",
+            "length_4_nm",
+            "y_rate [µm/s]",
+            "beta_rate_arcsec_s",
+            "beta_accel (urad/s²)",
             "z_cm",
         ]
         .map(Into::into)
@@ -188,11 +187,15 @@ mod tests {
             ("gamma", None),
             ("length_3", Some(1e-3)),
             ("length_rate_3", Some(1e-3)),
+            ("length_4", Some(1e-9)),
+            ("y_rate", Some(1e-6)),
+            ("beta_rate", Some(degree / 3600.0)),
+            ("beta_accel", Some(1e-6)),
             ("length_1", None),
         ] {
             assert_eq!(factor(name), expected, "{name}");
         }
-        assert_eq!(hint(&header, "z"), " (z_cm: its units are m, mm, um)");
+        assert_eq!(hint(&header, "z"), " (z_cm: its units are m, mm, um, nm)");
         assert_eq!(hint(&header, "gamma"), "");
     }
 }

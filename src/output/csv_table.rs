@@ -240,7 +240,11 @@ impl TableErrors {
             };
             let nearest = shown(&nearest_header(header, required));
             let is_angle = absent.iter().any(|name| name.starts_with("alpha"));
-            let angles = if is_angle { ", with R = Rx(alpha) Ry(beta) Rz(gamma)" } else { "" };
+            let angles = if is_angle {
+                ", with R = Rx(alpha) Ry(beta) Rz(gamma); --rotation names another order or quaternions"
+            } else {
+                ""
+            };
             self.add(format!(
                 "line {line}: missing columns {}: {found}; the nearest right one is \"{nearest}\"{angles}",
                 absent.join(", ")

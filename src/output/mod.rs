@@ -12,4 +12,5 @@ pub mod numbers;
 pub mod page;
 pub mod svg;
 pub mod text_table;
+pub mod units;
 pub mod version;

@@ -16,11 +16,27 @@ pub fn axis_unit(axis: usize) -> (f64, &'static str) {
     if axis < 3 { (1.0_f64.to_degrees(), "deg") } else { (1e3, "mm") }
 }
 
-/// Digits after the point with which millimetres and degrees of a machine are shown: the stroke is at least 100,000 of their
-/// steps, as 750 mm in micrometres. Metres have one more and tenths of the stroke two less.
-pub fn motion_digits(stroke_m: f64) -> usize {
-    // A hair less than 5, so that a round stroke has the same number however it was rounded.
-    (4.99 - (1e3 * stroke_m).log10()).ceil().clamp(3.0, 6.0) as usize
+/// Digits after the point with which people read the positions and angles of a machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MotionDigits {
+    /// Of millimetres. Metres have one more and tenths of the stroke two less.
+    pub mm: usize,
+    /// Of degrees.
+    pub deg: usize,
+}
+
+impl MotionDigits {
+    /// Digits that show a resolution \[m\], \[rad\].
+    pub fn new([length_m, angle_rad]: [f64; 2]) -> Self {
+        // A hair less, so that a power of ten has the same number however it was rounded.
+        let digits = |step: f64| (-0.01 - step.log10()).ceil().clamp(3.0, 6.0) as usize;
+        Self { mm: digits(1e3 * length_m), deg: digits(angle_rad.to_degrees()) }
+    }
+
+    /// Digits of a task coordinate in the unit of [`axis_unit`].
+    pub fn of_axis(self, axis: usize) -> usize {
+        if axis < 3 { self.deg } else { self.mm }
+    }
 }
 
 /// A number with three significant digits, with an exponent only where it is very large or small.
@@ -77,7 +93,12 @@ mod tests {
         ] {
             assert_eq!(significant(x), text);
         }
-        assert_eq!([2.0, 0.75, 0.1, 0.028, 1e-4, 1e-9].map(motion_digits), [3, 3, 3, 4, 6, 6]);
+        let digits = |length_m: f64| {
+            let MotionDigits { mm, deg } = MotionDigits::new([length_m, 2.0 * length_m]);
+            [mm, deg]
+        };
+        let lengths = [1e-4, 1e-6, 2.8e-7, 1e-7, 1e-9, 0.0].map(digits);
+        assert_eq!(lengths, [[3, 3], [3, 4], [4, 5], [4, 5], [6, 6], [6, 6]]);
         assert_eq!(percent(0.00123), "0.123 %");
         assert_eq!([0.001, 0.07, 1.0].map(plain_percent), ["0.1 %", "7 %", "100 %"]);
     }

@@ -166,7 +166,7 @@ impl Trial {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
         command.arg("identify").args(recordings(empty)).arg("--loaded").args(recordings(with_weight));
         command.arg("--known-mass").arg(self.weight().to_string());
-        command.arg("--at").arg(WEIGHT_AT.map(|x| x.to_string()).join(","));
+        command.arg("--at").arg(WEIGHT_AT.map(|x| format!("{x}m")).join(","));
         command.arg("--validate").args(recordings(unused)).arg("--output").arg(new).arg("--json");
         serde_json::from_str(&output(&mut command).unwrap()).unwrap()
     }

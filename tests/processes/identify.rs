@@ -138,7 +138,7 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     let circle = shown("hexad move --config F --motion circle --engage");
     session(&machine, &platform, shown("hexad run --config F --record other"), &[circle]);
     let line = shown(
-        "hexad identify empty/*.mcap --loaded loaded/*.mcap --known-mass 0.5 --at 0,0,0.1 --validate other/*.mcap --output NEW.toml --page NEW.html",
+        "hexad identify empty/*.mcap --loaded loaded/*.mcap --known-mass 0.5 --at 0,0,0.1m --validate other/*.mcap --output NEW.toml --page NEW.html",
     );
     let before = fs::read(&machine.file).unwrap();
     let ended = Hexad::spawn(&machine, "identify", typed(&machine, line)).ends_within(HANG);

@@ -48,6 +48,7 @@ mod released;
 mod reload;
 mod remains;
 mod requests;
+mod rotations;
 mod rounds;
 mod stale;
 mod tables;

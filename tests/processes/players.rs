@@ -150,7 +150,7 @@ fn a_player_takes_over_a_platform_that_is_held() {
         run(&machine, &[&["move", "--motion", "sines", "--seconds", "1", "--config", &file], more].concat())
     };
     let goes = || {
-        let gone = run(&machine, &["goto", "--engage", "--x-mm", "1110", "--config", &file]);
+        let gone = run(&machine, &["goto", "--engage", "--x", "1110mm", "--config", &file]);
         assert_eq!(gone.status.code(), Some(0), "{}", gone.stderr);
     };
     goes();

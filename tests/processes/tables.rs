@@ -115,7 +115,7 @@ fn what_is_not_understood_is_refused_with_the_cure() {
         (decimal_commas, "with decimal commas the fields must be separated by semicolons"),
         (
             poses("t,x_cm,y,z,alpha,beta,gamma", ',', 1.0, false),
-            "missing columns x (x_cm: its units are m, mm, um)",
+            "missing columns x (x_cm: its units are m, mm, um, nm)",
         ),
         (poses("t;x;y;z;alpha;beta;x_mm", ';', 1.0, false), "column x appears 2 times: must appear once"),
         (

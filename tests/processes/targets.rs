@@ -51,15 +51,18 @@ fn a_goto_is_refused_before_anything_moves_or_leaves_the_platform_standing() {
     let recorder = Recorder::start(&machine.name);
     let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
     daemon.says("standby: no setpoint");
-    let refusals: [(&[&str], i32, &str); 4] = [
+    let refusals: [(&[&str], i32, &str); 7] = [
         (
-            &["--relative", "--z-mm", "900"],
+            &["--relative", "--z", "900mm"],
             2,
             "outside of the workspace: leg 4: length 1.7708 m, bound 1.5963 m",
         ),
-        (&["--relative", "--x", "0.04"], 1, "not under control (state standby: no setpoint"),
+        (&["--relative", "--x", "0.04m"], 1, "not under control (state standby: no setpoint"),
         (&[], 2, "no target: give coordinates"),
-        (&["--x", "1", "--x-mm", "1"], 2, "cannot be used with"),
+        (&["--x", "5"], 2, "invalid value '5' for '--x <LENGTH>': has no unit: say 5mm or 5m"),
+        (&["--alpha", "-0.1"], 2, "has no unit: say -0.1deg or -0.1rad"),
+        (&["--gamma", "5mm"], 2, "must be an angle in rad, mrad, urad, deg, arcmin, arcsec"),
+        (&["--x-mm", "5"], 2, "--x-mm has no unit in its name any more, its value has one: --x 5mm"),
     ];
     for (more, code, words) in refusals {
         let Ended { status, stderr, .. } = goto(&machine, more);
@@ -68,7 +71,7 @@ fn a_goto_is_refused_before_anything_moves_or_leaves_the_platform_standing() {
     }
     let began_ns = monotonic_ns();
     let Ended { status: code, stdout, stderr } =
-        goto(&machine, &["--relative", "--x-mm", "40", "--gamma-deg", "4", "--engage"]);
+        goto(&machine, &["--relative", "--x", "40mm", "--gamma", "4deg", "--engage"]);
     assert_eq!(code.code(), Some(0), "{stderr}");
     assert!(stdout.contains("in position after ") && stdout.contains("stands under control"), "{stdout}");
     // Longer than any timeout after its source has left.
@@ -76,7 +79,7 @@ fn a_goto_is_refused_before_anything_moves_or_leaves_the_platform_standing() {
     assert_eq!(status(&machine)["state"], "active");
     is_at(&machine, 3, 1.14);
     is_at(&machine, 2, 4.0_f64.to_radians());
-    let going = Hexad::start(&machine, "goto", &["--relative", "--z-mm", "100", "--speed", "50%"]);
+    let going = Hexad::start(&machine, "goto", &["--relative", "--z", "100mm", "--speed", "50%"]);
     recorder.until("the platform moves", |recording| {
         recording.measured.last().filter(|measured| fastest(measured) > IN_MOTION).map(drop)
     });
@@ -119,7 +122,7 @@ fn relative_steps_add_up() {
     };
     goes(&["--home", "--engage"]);
     let home = status(&machine)["status"]["target"][5].as_f64().expect("a target");
-    (0..15).for_each(|_| goes(&["--relative", "--z-mm", "0.002"]));
+    (0..15).for_each(|_| goes(&["--relative", "--z", "2um"]));
     let_pass(Duration::from_secs(2));
     let target = status(&machine)["status"]["target"][5].as_f64().expect("a target");
     assert!((target - home - 30e-6).abs() < 1e-12, "{home} {target}");
@@ -128,7 +131,7 @@ fn relative_steps_add_up() {
     assert_eq!(status(&machine)["status"]["in_position"], true);
     // Legs that stick do not come to within an atom.
     let Ended { status: code, stderr, .. } =
-        goto(&machine, &["--relative", "--z-mm", "0.1", "--tolerance", "1e-9"]);
+        goto(&machine, &["--relative", "--z", "0.1mm", "--tolerance", "1nm"]);
     let words = "the reference has reached the target, but the platform was not in position";
     assert!(
         code.code() == Some(1) && stderr.contains(words) && stderr.contains("tolerance 1.00e-6 mm"),
@@ -143,10 +146,14 @@ fn relative_steps_add_up() {
 #[test]
 fn a_dry_run_needs_no_daemon() {
     let machine = Machine::patient("dry-run");
-    let Ended { status, stdout, stderr } =
-        goto(&machine, &["--relative", "--x-mm", "50", "--gamma", "0.1", "--dry-run"]);
+    let Ended { status, stdout, stderr } = goto(
+        &machine,
+        &["--relative", "--x", "50mm", "--y=-5mm", "--z", "-3um", "--gamma", "100mrad", "--dry-run"],
+    );
     assert_eq!(status.code(), Some(0), "{stderr}");
-    for words in ["from is home, as no daemon answers", "1150.000", "5.730", "limited by velocity"] {
+    for words in
+        ["from is home, as no daemon answers", "1150.000", "-5.000", "-0.003", "5.730", "limited by velocity"]
+    {
         assert!(stdout.contains(words), "{words}: {stdout}");
     }
     let duration = stdout.lines().find_map(|line| line.strip_prefix("duration  ")).expect("a duration");
@@ -155,11 +162,26 @@ fn a_dry_run_needs_no_daemon() {
     assert!(duration_s > 0.45 && duration_s < 1.2 * 0.46 + 0.1, "{duration}");
 }
 
+/// Steps of a machine with a stroke of 0.1 mm, and of one with 28 mm, have digits on the screen.
+#[test]
+fn a_small_step_is_seen() {
+    let machine = Machine::patient("digits");
+    for (name, alpha, z) in [("piezo", "0.000833", "135.005000"), ("telescope_m2", "0.00083", "-702.9950")] {
+        let file = format!("{}/tests/data/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let step = ["goto", "--config", &file, "--relative", "--z", "5um", "--alpha", "3arcsec", "--dry-run"];
+        let Ended { status, stdout, stderr } = run(&machine, &step);
+        assert_eq!(status.code(), Some(0), "{stderr}");
+        let to = stdout.lines().find(|line| line.starts_with("to ")).expect("a target");
+        let to: Vec<_> = to.split_whitespace().collect();
+        assert_eq!([to[1], to[6]], [alpha, z], "{name}: {stdout}");
+    }
+}
+
 #[test]
 fn a_slower_goto_takes_longer() {
     let machine = Machine::patient("speed");
     let seconds = |speed: &str| -> f64 {
-        let ended = goto(&machine, &["--relative", "--x-mm", "100", "--dry-run", "--speed", speed]);
+        let ended = goto(&machine, &["--relative", "--x", "100mm", "--dry-run", "--speed", speed]);
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         let duration =
             ended.stdout.lines().find_map(|line| line.strip_prefix("duration  ")).expect("a duration");
@@ -189,7 +211,7 @@ fn a_hold_ends_with_a_stop() {
         recording.statuses.last().filter(|status| status.state == State::Active as u32).map(drop)
     });
     // It is the source that counts, as long as it runs.
-    let Ended { status: code, stderr, .. } = goto(&machine, &["--relative", "--x-mm", "10"]);
+    let Ended { status: code, stderr, .. } = goto(&machine, &["--relative", "--x", "10mm"]);
     assert_eq!(code.code(), Some(1), "{stderr}");
     assert!(stderr.contains("(hexad) publishes setpoints; end it first"), "{stderr}");
     is_at(&machine, 3, 1.1);

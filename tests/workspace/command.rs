@@ -117,12 +117,15 @@ fn what_is_asked_for_wrongly_is_refused() {
             refused(&[flag, value], &[flag, &format!("'{value}'"), "must be in [0, 1000000]"]);
         }
     }
-    refused(&["--turn-deg", "91"], &["'91'", "must be in [0, 90] deg"]);
-    refused(&["--through", "0,0,1"], &["'0,0,1'", "must be six numbers"]);
-    refused(&["--through", "0,0,0,0,0,NaN"], &["must be six numbers"]);
-    refused(&["--through", "0,0,0,0,0,1.9"], &["--through 0,0,0,0,0,1.9: must be a pose", "too long"]);
-    refused(&["--through", "0,0,0,0,0,-1.25"], &["across a singular pose"]);
-    refused(&["--through", "0,0,0,0,0,0.02"], &["the condition is beyond 86.0"]);
+    refused(&["--turn", "91deg"], &["'91deg'", "must be in [0deg, 90deg]"]);
+    refused(&["--turn", "10"], &["has no unit: say 10deg or 10rad"]);
+    refused(&["--turn-deg", "10"], &["unexpected argument '--turn-deg'", "its value has one: --turn 5deg"]);
+    refused(&["--through", "0,0,1m"], &["'0,0,1m'", "must be 6 values, as in 0,0,5deg,0,0,1.25m"]);
+    refused(&["--through", "0,0,0,0,0,1.9"], &["1.9 has no unit: say 1.9mm or 1.9m"]);
+    let through = "--through [0.0, 0.0, 0.0, 0.0, 0.0, 1.9] [rad, m]: must be a pose";
+    refused(&["--through", "0,0,0,0,0,1.9m"], &[through, "too long"]);
+    refused(&["--through", "0,0,0,0,0,-1250mm"], &["across a singular pose"]);
+    refused(&["--through", "0,0,0,0,0,2e4um"], &["the condition is beyond 86.0"]);
     let file = folder.path().with_extension("file");
     fs::write(&file, "").unwrap();
     let ended = workspace("motion_base", &file, &["--resolution", "11"]);

@@ -8,6 +8,7 @@ use self::report::{AdviceReport, FidelityRow, SCHEMA};
 use super::arguments::MachineFile;
 use super::failure::{CommandError, Failure};
 use super::offline_tables::{read_trajectory, task_state};
+use super::orientation::{OrientationFormat, ROTATION_HELP};
 use super::progress::item_bar;
 use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::analysis::fidelity_choice::FidelityComparison;
@@ -17,7 +18,7 @@ use crate::config::fidelity::envelope;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::rigid::Motion;
-use crate::output::csv_table::TableError;
+use crate::output::csv_table::NumberTable;
 use crate::output::files::{print, print_json};
 use crate::output::numbers::{AXES, axis_unit, significant};
 use crate::output::text_table::{Left, Right, text_table};
@@ -38,6 +39,8 @@ pub struct AdviseArguments {
     /// A CSV file as for `hexad move`, instead of the envelope; `-` is standard input
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
+    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), requires = "trajectory")]
+    rotation: OrientationFormat,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -45,7 +48,11 @@ pub struct AdviseArguments {
 
 impl AdviseArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let report = advise(&self.machine.load()?, self.trajectory.as_deref())?;
+        let config = self.machine.load()?;
+        let path = self.trajectory.as_deref();
+        let table =
+            path.map(|path| read_trajectory(path, self.rotation, &config.machine.home)).transpose()?;
+        let report = advise(&config, path.zip(table.as_ref()))?;
         if self.json {
             print_json(&report)?
         } else {
@@ -58,19 +65,17 @@ impl AdviseArguments {
 /// Error that prevents advice.
 #[derive(Debug, thiserror::Error)]
 pub enum AdviseError {
-    #[error(transparent)]
-    Table(#[from] TableError),
     #[error("{}: no row can be evaluated: {outside} are outside the actuators' stroke, {singular} at singular poses; correct the trajectory", path.display())]
     NothingEvaluated { path: PathBuf, outside: u64, singular: u64 },
 }
 
 impl CommandError for AdviseError {}
 
-/// Evaluates the configured envelope or a trajectory.
-fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, AdviseError> {
+/// Evaluates the configured envelope or the trajectory of a file.
+fn advise(config: &Config, trajectory: Option<(&Path, &NumberTable)>) -> Result<AdviceReport, AdviseError> {
     let model = InverseDynamics::new(&config.machine);
     let (scene, comparison, motions) = match trajectory {
-        Some(path) => judge_trajectory(&model, path, &config.machine.home)?,
+        Some((path, table)) => judge_trajectory(&model, path, table)?,
         None => judge_envelope(config, &model),
     };
     let (times, tolerance) = (time(&model, &motions), config.deployment.control.fidelity_tolerance);
@@ -142,9 +147,8 @@ fn limits(limits: &EnvelopeBounds) -> String {
 fn judge_trajectory(
     model: &InverseDynamics,
     path: &Path,
-    home: &[f64; 6],
+    table: &NumberTable,
 ) -> Result<(String, FidelityComparison, Vec<Motion>), AdviseError> {
-    let table = read_trajectory(path, home)?;
     let rows = table.rows();
     let (mut tally, bar) = (ErrorStatistics::default(), item_bar(rows.len(), "rows"));
     let every = rows.len().div_ceil(TIMED_MOTIONS);

@@ -16,6 +16,7 @@ use crate::model::fidelity::{Exact, Fidelity};
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::task::TaskState;
+use crate::output::numbers::MotionDigits;
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
@@ -30,6 +31,9 @@ pub struct CheckReport {
     pub errors: Vec<Violation>,
     pub warnings: Vec<Violation>,
     pub legs: Vec<LegAtHome>,
+    /// Digits of the lengths in the text.
+    #[serde(skip)]
+    pub digits: MotionDigits,
     /// Frobenius condition: 6 is best, infinite is singular.
     pub condition: f64,
     /// `limits.condition`.
@@ -121,6 +125,7 @@ impl CheckReport {
             errors: examination.errors.clone(),
             warnings: examination.warnings.clone(),
             legs: legs(config),
+            digits: MotionDigits::new(config.resolution()),
             condition: sensitivity.condition,
             condition_limit: limits.condition,
             rate_hz: deployment.realtime.rate_hz,

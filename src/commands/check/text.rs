@@ -5,7 +5,7 @@ use core::fmt;
 
 use super::report::{CheckReport, LegAtHome};
 use crate::model::sensitivity::CONDITION_MEANING;
-use crate::output::numbers::{motion_digits, significant};
+use crate::output::numbers::{MotionDigits, fixed, significant};
 use crate::output::text_table::{Right, text_table};
 
 impl fmt::Display for CheckReport {
@@ -16,7 +16,7 @@ impl fmt::Display for CheckReport {
         };
         writeln!(f, "{}: {verdict}. At home, at rest:\n", self.machine)?;
         let header = ["leg", "length", "to shortest", "to longest", "force", "of the limit", "to joint axis"];
-        let rows = self.legs.iter().enumerate().map(|(index, leg)| cells(index, leg));
+        let rows = self.legs.iter().enumerate().map(|(index, leg)| cells(index, leg, self.digits));
         write!(f, "{}", text_table(2, &header.map(|name| (name, Right)), rows))?;
         writeln!(
             f,
@@ -41,15 +41,15 @@ impl fmt::Display for CheckReport {
     }
 }
 
-fn cells(index: usize, leg: &LegAtHome) -> [String; 7] {
-    let digits = motion_digits(leg.to_shortest_m + leg.to_longest_m) + 1;
+fn cells(index: usize, leg: &LegAtHome, digits: MotionDigits) -> [String; 7] {
+    let digits = digits.mm + 1;
     let metres = |length_m: f64| format!("{length_m:.digits$} m");
     [
         format!("{}", index + 1),
         metres(leg.length_m),
         metres(leg.to_shortest_m),
         metres(leg.to_longest_m),
-        format!("{:.2} N", leg.force_n.unwrap_or(f64::NAN)),
+        format!("{} N", fixed(leg.force_n.unwrap_or(f64::NAN), 2)),
         format!("{:.1} %", 100.0 * leg.force_ratio.unwrap_or(f64::NAN)),
         format!("{:.1} deg", leg.joint_axis_deg),
     ]

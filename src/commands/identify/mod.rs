@@ -9,6 +9,7 @@ use self::new_values::new_values;
 use self::recordings::Recorded;
 use self::report::{Delay, IdentificationReport, predicted};
 use super::failure::{CommandError, Failure};
+use super::quantity::{length, list};
 use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
 use crate::analysis::identification::{Load, Run, identify, samples};
 use crate::config::Config;
@@ -38,7 +39,7 @@ pub struct IdentifyArguments {
     /// The known weight, a compact one [kg]
     #[arg(long, value_name = "KG", requires = "loaded")]
     known_mass: Option<f64>,
-    /// Its centre of mass, in platform axes [m]
+    /// Its centre of mass, in platform axes, with its units, as in 0,-20mm,0.1m
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, requires = "loaded")]
     at: Option<[f64; 3]>,
     /// Recordings with a payload that is to be identified; without other recordings the machine is as its file says
@@ -145,11 +146,7 @@ impl IdentifyArguments {
 
 /// A place: three numbers with commas between them.
 fn place(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
-    let place = numbers.ok().and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
-    place
-        .filter(|place| place.iter().all(|x| x.is_finite()))
-        .ok_or_else(|| "must be three numbers, such as 0.3,-0.2,0.8".into())
+    list(text, [length; 3], "0,-20mm,0.1m")
 }
 
 fn runs_of(stretches: &[RecordedStretch], load: Load, delay_s: f64) -> Vec<Run> {

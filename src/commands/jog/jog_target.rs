@@ -7,13 +7,14 @@ use crate::commands::target::pose_of;
 use crate::control::constants::Constants;
 use crate::control::signals::limits::DerivativeLimits;
 use crate::model::rigid::Pose;
+use crate::output::numbers::MotionDigits;
 
 /// Velocities, as shares of the velocity of autonomous motions.
 const SHARES: [f64; 7] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
 const FIRST_SHARE: usize = 3;
 
-/// Steps of positions \[m\] and of angles \[rad\].
-const STEPS: [[f64; 2]; 4] = [[1e-5, 1.745e-5], [1e-4, 1.745e-4], [1e-3, 1.745e-3], [1e-2, 1.745e-2]];
+/// Steps of a coordinate, over the last digit that is shown of it.
+const STEPS: [f64; 4] = [1e1, 1e2, 1e3, 1e4];
 const FIRST_STEP: usize = 2;
 
 /// Age of the reference that is compared with the target \[s\]. It comes from a status report; this is twice
@@ -32,6 +33,7 @@ pub enum Pace {
 /// Target of a jog.
 pub struct JogTarget<'a> {
     constants: &'a Constants,
+    digits: MotionDigits,
     x: [f64; 6],
     is_continuous: bool,
     share: usize,
@@ -42,8 +44,16 @@ pub struct JogTarget<'a> {
 
 impl<'a> JogTarget<'a> {
     /// Target at X, in continuous motion.
-    pub fn new(constants: &'a Constants, x: [f64; 6]) -> Self {
-        Self { constants, x, is_continuous: true, share: FIRST_SHARE, step: FIRST_STEP, blocked: None }
+    pub fn new(constants: &'a Constants, digits: MotionDigits, x: [f64; 6]) -> Self {
+        Self {
+            constants,
+            digits,
+            x,
+            is_continuous: true,
+            share: FIRST_SHARE,
+            step: FIRST_STEP,
+            blocked: None,
+        }
     }
 
     pub fn x(&self) -> [f64; 6] {
@@ -55,11 +65,7 @@ impl<'a> JogTarget<'a> {
     }
 
     pub fn pace(&self) -> Pace {
-        if self.is_continuous {
-            Pace::Continuous(self.velocities())
-        } else {
-            Pace::Step(STEPS.get(self.step).copied().unwrap_or_default())
-        }
+        if self.is_continuous { Pace::Continuous(self.velocities()) } else { Pace::Step(self.steps()) }
     }
 
     fn velocities(&self) -> [f64; 2] {
@@ -68,12 +74,20 @@ impl<'a> JogTarget<'a> {
         [share * limits.position.velocity, share * limits.orientation.velocity]
     }
 
+    /// Step of a position \[m\] and of an angle \[rad\].
+    fn steps(&self) -> [f64; 2] {
+        let step = STEPS.get(self.step).copied().unwrap_or_default();
+        let MotionDigits { mm, deg } = self.digits;
+        let [position_mm, angle_deg] = [mm, deg].map(|digits| step * 0.1_f64.powi(digits as i32));
+        [1e-3 * position_mm, angle_deg.to_radians()]
+    }
+
     /// Applies a key. Returns the key if the motion continues while it is held.
     pub fn press(&mut self, key: Key, reference: &Pose) -> Option<Key> {
         match (key, self.is_continuous) {
             (Key::Move { .. }, true) => return Some(key),
             (Key::Move { axis, sign }, false) => {
-                let [position, angle] = STEPS.get(self.step).copied().unwrap_or_default();
+                let [position, angle] = self.steps();
                 self.shift(axis, sign * if axis < 3 { angle } else { position }, reference);
             }
             (Key::Faster, true) => self.share = (self.share + 1).min(SHARES.len() - 1),
@@ -144,7 +158,7 @@ mod tests {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
         let constants = constants(&config);
         let home = config.machine.home;
-        let mut target = JogTarget::new(&constants, home);
+        let mut target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), home);
         let reference = pose_of(&home);
         for _ in 0..10_000 {
             assert_eq!(target.press(UP, &reference), Some(UP));
@@ -169,14 +183,33 @@ mod tests {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
         let constants = constants(&config);
         let home = config.machine.home;
-        let mut target = JogTarget::new(&constants, home);
+        let mut target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), home);
         assert_eq!(target.press(Key::Mode, &pose_of(&home)), None);
         assert_eq!(target.press(Key::Faster, &pose_of(&home)), None);
-        assert_eq!(target.pace(), Pace::Step([1e-2, 1.745e-2]));
+        let Pace::Step([position, angle]) = target.pace() else { panic!("{:?}", target.pace()) };
+        assert!((position - 1e-2).abs() < 1e-12 && (angle - 1.0_f64.to_radians()).abs() < 1e-12);
         assert_eq!(target.press(UP, &pose_of(&home)), None);
         assert!((target.x()[5] - home[5] - 1e-2).abs() < 1e-12);
         // The next step is possible when the platform has arrived.
         assert_eq!(target.press(UP, &pose_of(&home)), None);
         assert!((target.x()[5] - home[5] - 1e-2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_smallest_step_is_of_the_size_of_the_machine() {
+        let files = [
+            (DEFAULT_CONFIG, 1e-5),
+            (include_str!("../../../tests/data/telescope_m2.toml"), 1e-6),
+            (include_str!("../../../tests/data/piezo.toml"), 1e-8),
+        ];
+        for (text, step) in files {
+            let config = Config::parse(text, "a test").unwrap();
+            let (constants, home) = (constants(&config), config.machine.home);
+            let mut target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), home);
+            for key in [Key::Mode, Key::Slower, Key::Slower, Key::Slower, UP] {
+                assert_eq!(target.press(key, &pose_of(&home)), None);
+            }
+            assert!((target.x()[5] - home[5] - step).abs() < 1e-9 * step + 1e-15, "{step}: {:?}", target.x());
+        }
     }
 }

@@ -17,6 +17,7 @@ use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
 use super::target::{TargetError, TargetSource, constants, pose_of};
 use crate::output::files::print;
+use crate::output::numbers::MotionDigits;
 use crate::realtime::stop_request::Stop;
 
 mod jog_target;
@@ -56,7 +57,8 @@ impl JogArguments {
         let constants = constants(&config);
         let within = self.engage.then(|| Duration::from_secs_f64(self.within));
         let mut source = TargetSource::open(&config, within, &stop)?;
-        let target = JogTarget::new(&constants, source.resting_x(&constants)?);
+        let digits = MotionDigits::new(config.resolution());
+        let target = JogTarget::new(&constants, digits, source.resting_x(&constants)?);
         jog(&mut source, target, &stop)?;
         Ok(print("the platform stands under control; hexad stop or park ends it\n")?)
     }

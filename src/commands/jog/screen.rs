@@ -65,12 +65,13 @@ mod tests {
     use crate::commands::status::screen::tests::answer;
     use crate::commands::target::constants;
     use crate::config::Config;
+    use crate::output::numbers::MotionDigits;
 
     #[test]
     fn it_fits_the_smallest_terminal() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
         let constants = constants(&config);
-        let target = JogTarget::new(&constants, config.machine.home);
+        let target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), config.machine.home);
         let held = Some(Key::Move { axis: 5, sign: -1.0 });
         let text = JogScreen { answer: &answer(), target: &target, held }.to_string();
         let widest = text.lines().map(|line| line.chars().count()).max();

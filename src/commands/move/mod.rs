@@ -20,6 +20,7 @@ use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use super::arguments::{MachineFile, duration};
 use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
+use super::orientation::{OrientationFormat, ROTATION_HELP};
 use super::plant::prepare_thread;
 use crate::config::Config;
 use crate::control::signals::diagnostic::Diagnostic;
@@ -53,6 +54,8 @@ pub struct MoveArguments {
     machine: MachineFile,
     #[command(flatten)]
     source: TrajectorySource,
+    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "pause", "resume"])]
+    rotation: OrientationFormat,
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
@@ -110,7 +113,7 @@ impl MoveArguments {
             return Ok(pause::request(&config, self.source.pause)?);
         }
         let trajectory = match (&self.source.trajectory, self.source.motion) {
-            (Some(path), _) => Trajectory::from_file(&config, path)?,
+            (Some(path), _) => Trajectory::from_file(&config, path, self.rotation)?,
             (None, motion) => {
                 Trajectory::built_in(&config, motion.unwrap_or(BuiltInMotion::Settle), self.seconds)?
             }

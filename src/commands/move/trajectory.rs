@@ -10,6 +10,7 @@ use super::precheck::Precheck;
 use crate::analysis::excitation_design::design;
 use crate::analysis::sampled_loop::edge;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
+use crate::commands::orientation::OrientationFormat;
 use crate::config::Config;
 use crate::model::task::TaskState;
 use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
@@ -79,8 +80,8 @@ impl Trajectory {
 
     /// A trajectory from a CSV file. It must begin and end at rest, its times must increase, and the daemon
     /// must accept it.
-    pub fn from_file(config: &Config, path: &Path) -> Result<Self, SetpointError> {
-        let table = read_trajectory(path, &config.machine.home)?;
+    pub fn from_file(config: &Config, path: &Path, format: OrientationFormat) -> Result<Self, SetpointError> {
+        let table = read_trajectory(path, format, &config.machine.home)?;
         let path = name_of(path);
         let trajectory = Self::from_rows(&table, path)?;
         trajectory.check(config, &table, path)?;

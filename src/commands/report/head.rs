@@ -13,8 +13,7 @@ use super::track::Track;
 use crate::config::Config;
 use crate::control::signals::state::State;
 use crate::model::LEGS;
-use crate::model::machine::Machine;
-use crate::output::numbers::motion_digits;
+use crate::output::numbers::MotionDigits;
 
 /// Head of a page.
 #[derive(Serialize)]
@@ -71,8 +70,10 @@ struct MachineHead {
     platform: [[f64; 3]; LEGS],
     home: [f64; 6],
     gravity: [f64; 3],
-    /// Digits after the point of metres; degrees have one less.
-    digits: usize,
+    /// Digits after the point of metres.
+    m_digits: usize,
+    /// Digits after the point of degrees.
+    deg_digits: usize,
 }
 
 /// Head of a page about a recording.
@@ -119,18 +120,20 @@ fn head<'a>(config: &'a Config, run: Events<'a>) -> Head<'a> {
         levels: vec![],
         kept: "",
         states: State::ALL.map(State::name),
-        machine: machine(&config.machine),
+        machine: machine(config),
         configuration: &config.text,
         run,
     }
 }
 
-fn machine(machine: &Machine) -> MachineHead {
+fn machine(config: &Config) -> MachineHead {
+    let machine = &config.machine;
     let joints = &machine.joints;
     let [base, platform] =
         [&joints.base, &joints.platform].map(|lanes| joints.triples.unpack_vectors(lanes).map(Into::into));
-    let digits = motion_digits(machine.actuator.stroke()) + 1;
-    MachineHead { base, platform, home: machine.home, gravity: machine.gravity.into(), digits }
+    let MotionDigits { mm, deg } = MotionDigits::new(config.resolution());
+    let gravity = machine.gravity.into();
+    MachineHead { base, platform, home: machine.home, gravity, m_digits: mm + 1, deg_digits: deg }
 }
 
 /// Text as JSON. Numbers without a value are null.

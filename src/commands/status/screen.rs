@@ -5,7 +5,7 @@ use core::fmt;
 use crate::control::signals::state::State;
 use crate::operator::protocol::AnswerLine;
 use crate::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
-use crate::output::numbers::{AXES, axis_unit, fixed, motion_digits, significant};
+use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed, significant};
 use crate::output::text_table::paragraph;
 
 /// Columns of the screen.
@@ -100,18 +100,18 @@ pub(in crate::commands) fn poses(f: &mut fmt::Formatter<'_>, report: &StatusRepo
         write!(f, "{:>11}", format!("{axis} {}", axis_unit(k).1))?;
     }
     writeln!(f)?;
-    let digits = report_digits(report);
+    let digits = MotionDigits::new(report.resolution);
     let error = report.orientation_error_rad.zip(report.position_error_m);
     let error = error.map(|([a, b, c], [x, y, z])| [a, b, c, x, y, z]);
-    for (name, numbers, digits) in
-        [("pose", report.pose, digits), ("setpoint", report.setpoint, digits), ("error", error, digits + 1)]
+    for (name, numbers, more) in
+        [("pose", report.pose, 0), ("setpoint", report.setpoint, 0), ("error", error, 1)]
     {
         write!(f, "{name:10}")?;
         match numbers {
             None => writeln!(f, "{:>11}", "unknown")?,
             Some(numbers) => {
                 for (k, number) in numbers.iter().enumerate() {
-                    write!(f, "{:>11}", fixed(number * axis_unit(k).0, digits))?;
+                    write!(f, "{:>11}", fixed(number * axis_unit(k).0, digits.of_axis(k) + more))?;
                 }
                 writeln!(f)?;
             }
@@ -120,14 +120,8 @@ pub(in crate::commands) fn poses(f: &mut fmt::Formatter<'_>, report: &StatusRepo
     writeln!(f)
 }
 
-/// Digits of millimetres and degrees.
-fn report_digits(report: &StatusReport) -> usize {
-    let [shortest, longest] = report.stroke_m;
-    motion_digits(longest - shortest)
-}
-
 pub(in crate::commands) fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
-    let digits = report_digits(report);
+    let digits = MotionDigits::new(report.resolution).mm;
     let coarse = digits - 2;
     let [shortest, longest] = report.stroke_m.map(|length_m| length_m * 1e3);
     let [left, right] = [shortest, longest].map(|end| fixed(end, coarse));
@@ -251,6 +245,7 @@ pub(in crate::commands) mod tests {
             time_to_singularity_s: Some(0.5),
             legs: vec![LegReport { length_m: 1.225, rate_m_s: Some(-0.123), force_n: -250.0 }; 6],
             stroke_m: [0.85, 1.6],
+            resolution: [1e-6, 2.5e-6],
             max_force_n: 500.0,
             sources: vec![source("setpoint"), source("measured")],
         };
@@ -277,7 +272,11 @@ pub(in crate::commands) mod tests {
                 assert!(text.contains("unknown") && text.contains("no measurement"), "{text}");
             }
             let report = answer.status.as_mut().unwrap();
-            **report = StatusReport { stroke_m: report.stroke_m, ..StatusReport::default() };
+            **report = StatusReport {
+                stroke_m: report.stroke_m,
+                resolution: report.resolution,
+                ..StatusReport::default()
+            };
         }
     }
 
@@ -286,7 +285,7 @@ pub(in crate::commands) mod tests {
         let text = Screen(&answer()).to_string();
         let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
         let pose: Vec<_> = line("pose").split_whitespace().map(String::from).collect();
-        assert_eq!(pose, ["pose", "-177.617", "177.617", "0.000", "-1234.568", "1100.000", "0.000"]);
+        assert_eq!(pose, ["pose", "-177.6169", "177.6169", "0.0000", "-1234.568", "1100.000", "0.000"]);
         assert!(line("error").contains("-0.0010     2.0000"), "{text}");
         let leg = line("  1");
         assert_eq!((leg.matches('#').count(), leg.matches('-').count()), (13, 7 + 2), "{leg}");
@@ -308,6 +307,7 @@ pub(in crate::commands) mod tests {
         let mut answer = answer();
         let report = answer.status.as_mut().unwrap();
         report.stroke_m = [0.083_303_7, 0.083_403_7];
+        report.resolution = [1e-9, 1.4e-8];
         report.pose = Some([0.0, 0.0, 1e-6, 0.0, 25e-6, 0.135_012]);
         report.legs = vec![LegReport { length_m: 0.083_351_2, rate_m_s: Some(-0.01), force_n: -250.0 }; 6];
         let text = Screen(&answer).to_string();

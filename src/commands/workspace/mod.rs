@@ -13,6 +13,7 @@ use self::slice::{Plane, Slice};
 use super::arguments::{MachineFile, number_within};
 use super::failure::{CommandError, Failure};
 use super::progress::item_bar;
+use super::quantity::{angle, angle_within, length, list};
 use crate::analysis::clearance::{Clearance, WorkspaceLimit};
 use crate::analysis::envelope::EnvelopeBounds;
 use crate::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
@@ -25,7 +26,7 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::output::files::{FileError, print, print_json};
-use crate::output::numbers::{MAX_MAGNITUDE, significant};
+use crate::output::numbers::significant;
 use crate::output::svg::ChartError;
 
 mod bands;
@@ -51,7 +52,7 @@ pub struct WorkspaceQuery {
     /// Two of alpha, beta, gamma, x, y, z, as in x-z; may be given more than once [default: horizontal, vertical, tilt]
     #[arg(long = "plane", value_name = "PLANE")]
     planes: Vec<Plane>,
-    /// The pose all slices go through, alpha,beta,gamma,x,y,z [rad, m] [default: home]
+    /// The pose all slices go through, alpha,beta,gamma,x,y,z with their units, as in 0,0,5deg,0,0,1.25m [default: home]
     #[arg(long, value_name = "POSE", value_parser = pose, allow_hyphen_values = true)]
     through: Option<[f64; 6]>,
     /// Poses along each axis of a slice
@@ -63,9 +64,9 @@ pub struct WorkspaceQuery {
     /// Angular acceleration for the forces, about any axis [default: that of [limits]]
     #[arg(long, value_name = "A", value_parser = acceleration, allow_negative_numbers = true)]
     angular_acceleration_rad_s2: Option<f64>,
-    /// Turn about any axis that the second ball allows [deg]
-    #[arg(long, value_name = "DEG", default_value_t = 10.0, value_parser = turn_deg, allow_negative_numbers = true)]
-    turn_deg: f64,
+    /// Turn about any axis that the second ball allows, with its unit
+    #[arg(long, value_name = "ANGLE", default_value = "10deg", value_parser = turn, allow_hyphen_values = true)]
+    turn: f64,
     /// Folder for the maps and their tables
     #[arg(long, value_name = "FOLDER", default_value = "hexad-workspace")]
     output: PathBuf,
@@ -88,9 +89,9 @@ fn acceleration(text: &str) -> Result<f64, String> {
     number_within(text, 0.0..=1e6, "")
 }
 
-/// Turn of a platform that remains upright \[deg\].
-fn turn_deg(text: &str) -> Result<f64, String> {
-    number_within(text, 0.0..=90.0, " deg")
+/// Turn of a platform that remains upright \[rad\].
+fn turn(text: &str) -> Result<f64, String> {
+    angle_within(text, ["0deg", "90deg"])
 }
 
 /// Number of poses along an axis: enough for a picture, few enough for memory.
@@ -103,11 +104,7 @@ fn resolution(text: &str) -> Result<usize, String> {
 
 /// X of a pose.
 fn pose(text: &str) -> Result<[f64; 6], String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
-    let six = numbers.ok().and_then(|numbers| numbers.try_into().ok());
-    let is_bounded = |x: &[f64; 6]| x.iter().all(|x| x.abs() <= MAX_MAGNITUDE);
-    six.filter(is_bounded)
-        .ok_or_else(|| "must be six numbers, as in 0,0,0,0,0,1.25, at most 1e12 in magnitude".into())
+    list(text, [angle, angle, angle, length, length, length], "0,0,5deg,0,0,1.25m")
 }
 
 /// Error that prevents the maps.
@@ -117,7 +114,7 @@ pub enum WorkspaceError {
     File(#[from] FileError),
     #[error(transparent)]
     Chart(#[from] ChartError),
-    #[error("--through {}: must be a pose the platform can take: {obstacle}", x.map(|x| x.to_string()).join(","))]
+    #[error("--through {x:?} [rad, m]: must be a pose the platform can take: {obstacle}")]
     Through { x: [f64; 6], obstacle: ObstacleText },
 }
 
@@ -144,7 +141,7 @@ impl WorkspaceReport {
         let slices = slices(machine, effort, query, through);
         let envelope = deployment.envelope.filter(has_extent);
         let shape = envelope.unwrap_or_else(|| reachable_envelope::nominal_bounds(machine));
-        let regions = regions(&reachable, &clearance, query.turn_deg.to_radians(), &shape);
+        let regions = regions(&reachable, &clearance, query.turn, &shape);
         let [ball, ..] = &regions;
         let drawing = MapDrawing { name, machine, largest_condition, ball: ball.guaranteed };
         let files = write(&drawing, &slices, &query.output)?;
@@ -157,7 +154,7 @@ impl WorkspaceReport {
             condition_limit: largest_condition,
             max_force_n: machine.actuator.available_force(),
             slices,
-            regions: region_reports(regions, query.turn_deg, envelope.is_some(), largest_condition),
+            regions: region_reports(regions, query.turn.to_degrees(), envelope.is_some(), largest_condition),
             largest_box: BoxRange::all(&shape, regions[2].guaranteed),
             hint: None,
             files,

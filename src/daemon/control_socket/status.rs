@@ -129,6 +129,7 @@ impl StatusSource {
                 .filter(|time_s| is_known && time_s.is_finite()),
             legs: legs(snapshot),
             stroke_m: [machine.actuator.min_length, machine.actuator.max_length],
+            resolution: loaded.config.resolution(),
             max_force_n: machine.actuator.max_force,
             sources: self.sources(snapshot, now_ns),
         }

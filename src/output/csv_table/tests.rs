@@ -92,7 +92,7 @@ fn semicolons_tabs_decimal_commas_and_units_are_read() {
         ),
         ("t;x\n0;1.000,5\n", "line 2: x = \"1.000,5\": must be a number"),
         ("t;x\n0;1,000,5\n", "line 2: x = \"1,000,5\": must be a number"),
-        ("t,x_cm\n0,1\n", "line 1: missing columns x (x_cm: its units are m, mm, um)"),
+        ("t,x_cm\n0,1\n", "line 1: missing columns x (x_cm: its units are m, mm, um, nm)"),
         ("t,x,x_mm\n0,1,1000\n", "line 1: column x appears 2 times: must appear once"),
     ] {
         let message = read(text).unwrap_err().to_string();
@@ -150,7 +150,7 @@ fn headers_of_other_programs_are_read() {
 fn what_is_not_read_is_one_sentence() {
     let read =
         |text: &str| NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &pose_columns(), &[]);
-    let angles = "with R = Rx(alpha) Ry(beta) Rz(gamma)";
+    let angles = "with R = Rx(alpha) Ry(beta) Rz(gamma); --rotation names another order or quaternions";
     for (text, wanted) in [
         (
             "Time (s),Roll (deg),Pitch (deg),Yaw (deg),X (mm),Y (cm),Z (mm)\n0,0,0,0,0,0,650\n",
@@ -162,11 +162,11 @@ fn what_is_not_read_is_one_sentence() {
         ),
         (
             "t,alpha,beta,gamma,x,y [cm],note\n0,0,0,0,0,0,\n",
-            "line 1: missing columns y (y [cm]: its units are m, mm, um), z: the header is \"t,alpha,beta,gamma,x,y [cm],note\"; the nearest right one is \"t,alpha,beta,gamma,x,y_m,note,z\"".into(),
+            "line 1: missing columns y (y [cm]: its units are m, mm, um, nm), z: the header is \"t,alpha,beta,gamma,x,y [cm],note\"; the nearest right one is \"t,alpha,beta,gamma,x,y_m,note,z\"".into(),
         ),
         (
             "t,alpha,beta,gamma,x_mm,y,z\ns,rad,rad,rad,m,cm,m\n",
-            "line 2: unit of x_mm = \"m\": must be as in the header\nx.csv: line 2: unit of y = \"cm\": must be m, mm, um".into(),
+            "line 2: unit of x_mm = \"m\": must be as in the header\nx.csv: line 2: unit of y = \"cm\": must be m, mm, um, nm".into(),
         ),
         (
             &("t,alpha,beta,gamma,x,y,z\n".to_string() + &"0,0,0,0,off,0,0\n".repeat(300) + &"0,0,0,0\n".repeat(200)),

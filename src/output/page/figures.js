@@ -6,8 +6,8 @@ const LEGS = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
 // { label with unit, names of the components, signal, the reference it is compared with, and least digits after the point }
 const FIGURES = [
   { title: "Pose of the platform", panels: [
-    { label: "angle [deg]", names: ["alpha", "beta", "gamma"], signal: "angle", reference: "angle_ref", digits: HEAD.machine.digits - 1 },
-    { label: "position [m]", names: AXES, signal: "position", reference: "position_ref", digits: HEAD.machine.digits },
+    { label: "angle [deg]", names: ["alpha", "beta", "gamma"], signal: "angle", reference: "angle_ref", digits: HEAD.machine.deg_digits },
+    { label: "position [m]", names: AXES, signal: "position", reference: "position_ref", digits: HEAD.machine.m_digits },
   ] },
   { title: "Velocity of the platform", panels: [
     { label: "angular velocity [deg/s]", names: AXES, signal: "angular_velocity", reference: "angular_velocity_ref" },
@@ -18,7 +18,7 @@ const FIGURES = [
     { label: "acceleration [m/s²]", names: AXES, signal: "acceleration", reference: "acceleration_ref" },
   ] },
   { title: "Lengths of the legs", panels: [
-    { label: "length [m]", names: LEGS, signal: "length", reference: "length_ref", digits: HEAD.machine.digits },
+    { label: "length [m]", names: LEGS, signal: "length", reference: "length_ref", digits: HEAD.machine.m_digits },
   ] },
   { title: "Velocities of the legs", panels: [
     { label: "velocity [m/s]", names: LEGS, signal: "leg_rate", reference: "leg_rate_ref" },

@@ -184,7 +184,7 @@ function describe(angles, position, isKnown) {
   const line = (names, numbers, unitName, digits) =>
     names.map((name, k) => `${name} ${numbers[k].toFixed(digits).replace("-", "−")} ${unitName}`).join("   ");
   document.getElementById("pose").textContent = isKnown
-    ? `${line(AXES, position, "m", HEAD.machine.digits)}\n${line(["alpha", "beta", "gamma"], angles, "°", HEAD.machine.digits - 1)}\n${intervalText(now)}`
+    ? `${line(AXES, position, "m", HEAD.machine.m_digits)}\n${line(["alpha", "beta", "gamma"], angles, "°", HEAD.machine.deg_digits)}\n${intervalText(now)}`
     : `pose unknown; drawn at home\n\n${intervalText(now)}`;
 }
 

@@ -7,6 +7,7 @@ use hexad::commands::forward_kinematics::{StartPose, forward_kinematics};
 use hexad::commands::inverse_dynamics::inverse_dynamics;
 use hexad::commands::r#move::SetpointError;
 use hexad::commands::r#move::trajectory::Trajectory;
+use hexad::commands::orientation::OrientationFormat;
 use hexad::config::Config;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::Machine;
@@ -50,7 +51,11 @@ pub fn hold(input: &[u8]) -> bool {
         let with_rates = table.rows().first().is_some_and(|row| row.len() > length_columns().len());
         let width = if with_rates { 9 + 6 } else { 9 };
         for start in [StartPose::Previous, StartPose::Home] {
-            check_output(table, &mut forward_kinematics(&MACHINE, start, table).0, width);
+            check_output(
+                table,
+                &mut forward_kinematics(&MACHINE, start, OrientationFormat::OF_X, table).0,
+                width,
+            );
         }
     }
     motions.is_some() || lengths.is_some()
