@@ -82,6 +82,32 @@ impl TaskState {
         }
     }
 
+    /// Inverse of [`Self::motion`], with the Bryan angles nearest to `near`. `None` at beta = +-90 deg, where the rates of alpha and
+    /// gamma do not follow from omega.
+    ///
+    /// Conditioning: errors of the rates of alpha and gamma grow with `1 / cos(beta)`, those of their accelerations with its
+    /// square.
+    pub fn from_motion(motion: &Motion, near: &[f64; 6]) -> Option<Self> {
+        let Motion { pose, twist, acceleration } = motion;
+        let x = task_coordinates(pose, near);
+        let [alpha, beta, ..] = x;
+        let [(sa, ca), (sb, cb)] = [alpha, beta].map(libm::sincos);
+        if cb.abs() <= MIN_COS_BETA {
+            return None;
+        }
+        // E^-1: about x by -alpha the columns of E are x, y and [sin(beta) 0 cos(beta)].
+        let rates = |w: Vector3<f64>| {
+            let gamma = (ca * w.z - sa * w.y) / cb;
+            Vector3::new(w.x - sb * gamma, ca * w.y + sa * w.z, gamma)
+        };
+        let rate = rates(twist.angular);
+        let still = Self { x: x.into(), xd: six(&rate, &twist.linear), ..Self::default() };
+        // E' X', the angular acceleration without angle accelerations.
+        let bias = still.motion().acceleration.angular;
+        let accel = rates(acceleration.angular - bias);
+        Some(Self { xdd: six(&accel, &acceleration.linear), ..still })
+    }
+
     /// The same motion with the triple of Bryan angles nearest to `near`, as of [`task_coordinates`]. Where only the sum or the
     /// difference of alpha and gamma is determined, a state in motion keeps its own.
     pub fn nearest_to(&self, near: &[f64; 6]) -> Self {
@@ -149,6 +175,10 @@ fn nearest_angles([alpha, beta, gamma]: [f64; 3], near: &[f64; 6]) -> ([f64; 3],
     if distance(first) <= distance(second) { (first, false) } else { (second, true) }
 }
 
+fn six(angular: &Vector3<f64>, linear: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(angular.x, angular.y, angular.z, linear.x, linear.y, linear.z)
+}
+
 fn rotation_x(angle: f64) -> Matrix3<f64> {
     let (s, c) = libm::sincos(angle);
     Matrix3::new(1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c)
@@ -177,6 +207,24 @@ mod tests {
         assert!((omega - now.twist.angular).norm() < 1e-8);
         let alpha = (after.twist.angular - before.twist.angular) / (2.0 * h);
         assert!((alpha - now.acceleration.angular).norm() < 1e-8);
+    }
+
+    #[test]
+    fn a_motion_gives_its_rates_back_except_at_gimbal_lock() {
+        let state = |beta: f64| TaskState {
+            x: Vector6::new(0.3, beta, -0.8, 0.1, 0.2, 1.0),
+            xd: Vector6::new(1.0, -2.0, 0.5, 0.3, 0.0, -0.1),
+            xdd: Vector6::new(-3.0, 1.0, 2.0, 0.0, 1.0, 0.5),
+        };
+        for beta in [-1.5, 0.0, 0.4, 1.5, 1.7, 3.0] {
+            let (wanted, cos) = (state(beta), libm::cos(beta));
+            let found = TaskState::from_motion(&wanted.motion(), &wanted.x.into()).unwrap();
+            let [x, xd, xdd] = [found.x - wanted.x, found.xd - wanted.xd, found.xdd - wanted.xdd];
+            assert!(x.amax() < 1e-14, "{x}");
+            assert!(xd.amax() < 1e-14 / cos.abs() && xdd.amax() < 1e-14 / (cos * cos), "{xd}{xdd}");
+        }
+        let locked = state(FRAC_PI_2);
+        assert_eq!(TaskState::from_motion(&locked.motion(), &locked.x.into()), None);
     }
 
     #[test]
