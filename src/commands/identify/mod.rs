@@ -4,18 +4,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use self::machine_file::{MachineFileError, changed_margins, difference, edited, write_new};
 use self::new_values::new_values;
 use self::recordings::Recorded;
 use self::report::{Delay, IdentificationReport};
 use super::failure::{CommandError, Failure};
+use super::machine_file::{changed_margins, difference, edited, write_new};
 use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
 use crate::analysis::identification::{Load, Run, identify, samples};
 use crate::config::Config;
 use crate::model::machine::Machine;
 use crate::output::files::{print, print_json};
 
-mod machine_file;
 mod new_values;
 mod quantities;
 mod recordings;
@@ -66,8 +65,6 @@ pub enum IdentifyError {
     #[error("--known-mass = {0} kg: must be greater than 0")]
     Weight(f64),
 }
-
-impl CommandError for MachineFileError {}
 
 impl CommandError for IdentifyError {
     fn has_begun(&self) -> bool {

@@ -2,6 +2,7 @@
 //! the workspace.
 
 use crate::analysis::target_motion::{TargetRefusal, WorkspaceBound, check_target};
+use crate::commands::coordinates::Coordinates;
 use crate::commands::jog::keys::Key;
 use crate::commands::target::pose_of;
 use crate::control::constants::Constants;
@@ -32,6 +33,8 @@ pub enum Pace {
 /// Target of a jog.
 pub struct JogTarget<'a> {
     constants: &'a Constants,
+    coordinates: &'a Coordinates,
+    /// X of the tool in the work frame.
     x: [f64; 6],
     is_continuous: bool,
     share: usize,
@@ -41,13 +44,23 @@ pub struct JogTarget<'a> {
 }
 
 impl<'a> JogTarget<'a> {
-    /// Target at X, in continuous motion.
-    pub fn new(constants: &'a Constants, x: [f64; 6]) -> Self {
-        Self { constants, x, is_continuous: true, share: FIRST_SHARE, step: FIRST_STEP, blocked: None }
+    /// Target at X of the platform, in continuous motion. Keys move the tool.
+    pub fn new(constants: &'a Constants, coordinates: &'a Coordinates, platform: [f64; 6]) -> Self {
+        let x = coordinates.tool_x(&platform);
+        Self {
+            constants,
+            coordinates,
+            x,
+            is_continuous: true,
+            share: FIRST_SHARE,
+            step: FIRST_STEP,
+            blocked: None,
+        }
     }
 
+    /// X of the platform.
     pub fn x(&self) -> [f64; 6] {
-        self.x
+        self.coordinates.platform_x(&self.x)
     }
 
     pub fn blocked(&self) -> Option<&WorkspaceBound> {
@@ -97,7 +110,7 @@ impl<'a> JogTarget<'a> {
         if let Some(x) = x.get_mut(axis) {
             *x += by;
         }
-        let pose = pose_of(&x);
+        let pose = pose_of(&self.coordinates.platform_x(&x));
         let step = if self.is_continuous { 0.0 } else { by.abs() };
         if self.distance_ratio(reference, &pose, step) > 1.0 {
             return;
@@ -142,9 +155,9 @@ mod tests {
     #[test]
     fn a_target_stays_near_its_reference_and_in_the_workspace() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let constants = constants(&config);
+        let (constants, coordinates) = (constants(&config), Coordinates::default());
         let home = config.machine.home;
-        let mut target = JogTarget::new(&constants, home);
+        let mut target = JogTarget::new(&constants, &coordinates, home);
         let reference = pose_of(&home);
         for _ in 0..10_000 {
             assert_eq!(target.press(UP, &reference), Some(UP));
@@ -167,9 +180,9 @@ mod tests {
     #[test]
     fn a_step_is_one_step() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let constants = constants(&config);
+        let (constants, coordinates) = (constants(&config), Coordinates::default());
         let home = config.machine.home;
-        let mut target = JogTarget::new(&constants, home);
+        let mut target = JogTarget::new(&constants, &coordinates, home);
         assert_eq!(target.press(Key::Mode, &pose_of(&home)), None);
         assert_eq!(target.press(Key::Faster, &pose_of(&home)), None);
         assert_eq!(target.pace(), Pace::Step([1e-2, 1.745e-2]));

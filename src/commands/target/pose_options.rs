@@ -8,7 +8,7 @@ use crate::commands::arguments::number_within;
 const LARGEST: f64 = 1e6;
 
 #[derive(Clone, Copy, Debug, Default, Args)]
-#[command(next_help_heading = "Target, X of the base frame; what is not given stays as it is")]
+#[command(next_help_heading = "Target, X of the platform or of --tool; what is not given stays as it is")]
 pub struct PoseOptions {
     /// x [m]
     #[arg(long, value_name = "M", value_parser = number, allow_negative_numbers = true, conflicts_with = "x_mm")]
