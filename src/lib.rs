@@ -70,6 +70,7 @@
 //! | fidelity | which terms of the dynamics the model evaluates, from `gravity` to `exact`, see [`model::fidelity`] |
 //! | fit | shrinking a built-in motion until stroke, rates and forces keep a reserve |
 //! | following error | distance of the platform from the reference |
+//! | frame | axes with an origin: base, platform, and those named in the machine file, see tool frame and work frame |
 //! | hold | constant force or pose between two instants |
 //! | home | configured pose from which the machine starts and to which it parks |
 //! | in position | the measured pose has been within a tolerance of an unchanged setpoint for the settling time, `[in_position]` |
@@ -110,9 +111,11 @@
 //! | stroke | range of a leg's length |
 //! | target | goal of the reference: the setpoint, or a pose to hold |
 //! | timeline | hold, approach, settle, motion, settle |
+//! | tool frame | frame fixed in the platform; a tool turns about its origin, see [`motion::frames`] |
 //! | trusted step | change of pose for which Newton's method is proved to find the only solution |
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
 //! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |
+//! | work frame | frame fixed in the base, in which the pose of a tool is given |
 #![cfg_attr(not(any(feature = "client", test)), no_std)]
 
 #[cfg(feature = "daemon")]

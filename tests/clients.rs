@@ -7,6 +7,7 @@ mod common;
 mod clients {
     mod declarations;
     mod drivers;
+    mod frames;
     mod library;
     mod requests;
     mod verdicts;

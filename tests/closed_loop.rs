@@ -22,6 +22,7 @@ mod identification;
 mod inputs;
 mod limits;
 mod modes;
+mod pivot;
 mod policies;
 mod poses;
 mod replay;

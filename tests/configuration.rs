@@ -6,6 +6,7 @@ mod bodies;
 mod deployment;
 mod examination;
 mod files;
+mod frames;
 mod limits;
 mod plant;
 mod reference;

@@ -7,6 +7,7 @@
 use crate::common;
 
 mod dynamics;
+mod frames;
 mod invariance;
 mod kinematics;
 mod layouts;

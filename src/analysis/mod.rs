@@ -12,6 +12,7 @@
 //! | motion that shows the parameters | [`excitation_design`] |
 //! | margins of a sampled loop | [`sampled_loop`] |
 //! | path of the reference to a target | [`target_motion`] |
+//! | straight path of a tool, within the limits | [`tool_motion`] |
 //! | derivatives of a motion given by poses | [`pose_spline`] |
 //! | many motions, on all processors | [`batch`] |
 //!
@@ -39,3 +40,4 @@ pub mod region_search;
 pub mod region_shape;
 pub mod sampled_loop;
 pub mod target_motion;
+pub mod tool_motion;

@@ -151,6 +151,16 @@ pub enum TargetRefusal {
     Start(WorkspaceBound),
 }
 
+impl TargetRefusal {
+    /// The refusal of a pose on the way to a target.
+    pub(super) fn on_way(self, share: f64) -> Self {
+        match self {
+            Self::Target(bound) => Self::Way { bound, share },
+            other => other,
+        }
+    }
+}
+
 /// Every bound of the workspace at a pose, each with the leg or coordinate that is nearest to it.
 pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBound> {
     let (machine, parameters) = (constants.machine(), &constants.parameters);
@@ -238,7 +248,7 @@ pub fn target_motion(
         let end_ns = reference.time_ns() + period_ns;
         reference.advance(constants, end_ns, Some(&Target::Pose { pose: to, speed_share: speed }));
         observe(&reference, &before);
-        survey.add(constants, &reference);
+        survey.add(constants, reference.motion(), reference.active_limits());
         left = distance(&reference.motion().pose, to);
         if left < (nearest_yet - at_velocity).max((1.0 - PROGRESS_OF_DISTANCE) * nearest_yet) {
             (nearest_yet, progress_ns, stopped_by) = (left, end_ns, LimitSet::default());
@@ -248,7 +258,7 @@ pub fn target_motion(
             return Err(ended(constants, &reference.motion().pose, stopped_by, 1.0 - nearest_yet / whole));
         }
     }
-    Ok(survey.result(reference.time_ns()))
+    Ok(survey.result(reference.time_ns() as f64 * 1e-9))
 }
 
 /// Progress at [`PROGRESS_OF_VELOCITY`] of the limits of autonomous motions.
@@ -276,21 +286,21 @@ fn ended(constants: &Constants, pose: &Pose, stopped_by: LimitSet, share: f64) -
 }
 
 /// Largest quantities on the way.
-struct Survey {
+pub(super) struct Survey {
     motion: TargetMotion,
     limited: [u64; Limit::ALL.len()],
     cycles: u64,
 }
 
 impl Survey {
-    fn new(constants: &Constants, start: &Motion) -> Self {
+    pub fn new(constants: &Constants, start: &Motion) -> Self {
         let lengths_m = leg_lengths(constants.machine(), &start.pose).map(|length| [length; 2]);
         let motion = TargetMotion { lengths_m, ..TargetMotion::default() };
         Self { motion, limited: [0; Limit::ALL.len()], cycles: 0 }
     }
 
-    fn add(&mut self, constants: &Constants, reference: &ReferenceGenerator) {
-        let now = reference.motion();
+    /// Adds an instant, with the limits that hold the motion back.
+    pub fn add(&mut self, constants: &Constants, now: &Motion, active_limits: LimitSet) {
         let legs = leg_motion(constants.machine(), now);
         let motion = &mut self.motion;
         for ([shortest, longest], length) in motion.lengths_m.iter_mut().zip(legs.length) {
@@ -302,14 +312,15 @@ impl Survey {
         motion.velocity_m_s = motion.velocity_m_s.max(now.twist.linear.norm());
         motion.velocity_rad_s = motion.velocity_rad_s.max(now.twist.angular.norm());
         for (count, limit) in self.limited.iter_mut().zip(Limit::ALL) {
-            *count += u64::from(reference.active_limits().contains(limit));
+            *count += u64::from(active_limits.contains(limit));
         }
         self.cycles += 1;
     }
 
-    fn result(self, end_ns: u64) -> TargetMotion {
+    /// The result of a motion of this duration \[s\].
+    pub fn result(self, duration_s: f64) -> TargetMotion {
         let cycles = self.cycles.max(1) as f64;
         let limited_shares = self.limited.map(|count| count as f64 / cycles);
-        TargetMotion { duration_s: end_ns as f64 * 1e-9, limited_shares, ..self.motion }
+        TargetMotion { duration_s, limited_shares, ..self.motion }
     }
 }

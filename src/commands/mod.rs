@@ -17,6 +17,7 @@ use self::export::ExportArguments;
 use self::failure::Failure;
 use self::faults::FaultTables;
 use self::forward_kinematics::ForwardKinematicsArguments;
+use self::frame::FrameArguments;
 use self::goto::GotoArguments;
 use self::hold::HoldArguments;
 use self::identify::IdentifyArguments;
@@ -44,6 +45,7 @@ pub mod advise;
 mod arguments;
 pub mod check;
 mod convert;
+pub mod coordinates;
 pub mod demo;
 pub mod doctor;
 mod excite;
@@ -51,6 +53,7 @@ pub mod export;
 mod failure;
 pub mod faults;
 pub mod forward_kinematics;
+mod frame;
 mod goto;
 mod hold;
 mod identify;
@@ -58,6 +61,7 @@ pub mod in_step;
 pub mod inverse_dynamics;
 mod jog;
 pub mod log;
+mod machine_file;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;
@@ -128,6 +132,8 @@ enum CommandArguments {
     Faults,
     /// Print the declarations of the messages for a driver in another language
     Messages(MessagesArguments),
+    /// Show the named frames of a machine file, or set one where the platform is
+    Frame(FrameArguments),
     /// Validate a machine file and show the machine at home
     Check(CheckArguments),
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
@@ -185,6 +191,7 @@ impl CommandLine {
             Is::View(arguments) => arguments.execute(),
             Is::Faults => Ok(print(FaultTables)?),
             Is::Messages(arguments) => arguments.execute(),
+            Is::Frame(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
             Is::Doctor(arguments) => arguments.execute(),
             Is::Identify(arguments) => arguments.execute(),

@@ -15,8 +15,8 @@ use crate::output::excerpt::excerpt;
 const RELOADABLE: [&str; 8] =
     ["control", "drive", "envelope", "in_position", "limits", "measured", "setpoint", "timeouts"];
 
-/// Sections that the daemon does not read.
-const FOREIGN: [&str; 1] = ["plant"];
+/// Sections that the daemon does not read: commands read them from the file each time.
+const FOREIGN: [&str; 2] = ["frame", "plant"];
 
 /// A key whose value differs. Displays as `limits.velocity_m_s: 0.5 -> 0.4`.
 #[derive(Clone, Debug, PartialEq, Eq)]

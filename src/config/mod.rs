@@ -20,6 +20,7 @@ use crate::model::machine::{Machine, at_most_256_bits};
 
 pub use self::bound::number;
 use self::deployment::Deployment;
+use self::frames::NamedFrame;
 use self::reader::{SectionReader, ViolationLog};
 
 mod bound;
@@ -28,6 +29,7 @@ pub mod control_loops;
 pub mod deployment;
 pub mod examination;
 pub mod fidelity;
+pub mod frames;
 mod geometry;
 mod machine;
 pub mod machine_name;
@@ -52,6 +54,8 @@ pub struct Config {
     pub name: String,
     /// Model of the machine.
     pub machine: Machine,
+    /// Named frames, for commands.
+    pub frames: Vec<NamedFrame>,
     /// Settings with which the machine is run.
     pub deployment: Deployment,
     /// The file as it was read, for recordings.
@@ -122,12 +126,13 @@ impl Config {
         let mut root = SectionReader::root(&log, table.get_ref());
         let name = root.name("name", MAX_NAME_LENGTH);
         let machine = machine::read(&mut root, level);
+        let frames = frames::read(&mut root);
         let deployment = deployment::read(&mut root, &machine);
         root.finish();
         match log.into_violations() {
             violations if violations.is_empty() => {
                 let (text, place) = (original.into(), place.into());
-                Ok(Self { name, machine, deployment, text, place, path: None })
+                Ok(Self { name, machine, frames, deployment, text, place, path: None })
             }
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }

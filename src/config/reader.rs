@@ -132,13 +132,12 @@ impl<'t> SectionReader<'t> {
     /// One of several names, with a default.
     pub fn choice_or<T: Copy>(&mut self, key: &'static str, default: T, options: &[(&str, T)]) -> T {
         let Some(value) = self.find(key, None) else { return default };
-        let name = value.get_ref().as_str();
-        let chosen = options.iter().find(|(option, _)| name == Some(option));
-        if chosen.is_none() {
-            let names: Vec<_> = options.iter().map(|(option, _)| format!("\"{option}\"")).collect();
-            self.reject(key, format!("must be one of {}", names.join(", ")));
-        }
-        chosen.map_or(default, |(_, choice)| *choice)
+        self.checked_choice(key, value, options).unwrap_or(default)
+    }
+
+    /// One of several names; required.
+    pub fn choice<T: Copy>(&mut self, key: &'static str, options: &[(&str, T)]) -> Option<T> {
+        self.required(key, choice_bound(options)).and_then(|value| self.checked_choice(key, value, options))
     }
 
     /// A required name of letters, digits, `_` and `-`.
@@ -201,8 +200,17 @@ impl<'t> SectionReader<'t> {
         if rows.len() > count || rows.len() < count && !self.log.incomplete {
             self.reject_as(key, format!("{} sections", rows.len()), format!("must be {bound}"));
         }
-        let row = |(i, row)| self.child(format!("{}[{}]", self.key(key), i + 1), Some(row));
-        rows.iter().take(MAX_VIOLATIONS).enumerate().map(row).collect()
+        self.children(key, rows.iter().take(MAX_VIOLATIONS))
+    }
+
+    /// Readers of any number of sections with the same header.
+    pub fn optional_rows(&mut self, key: &'static str) -> Vec<Self> {
+        let Some(value) = self.find(key, None) else { return Vec::new() };
+        let Some(rows) = value.get_ref().as_array() else {
+            self.reject(key, format!("must be sections headed [[{key}]]"));
+            return Vec::new();
+        };
+        self.children(key, rows.iter())
     }
 
     /// Logs a violation by the value of `key`, as written or by default.
@@ -239,6 +247,11 @@ impl<'t> SectionReader<'t> {
                 self.add(line, self.key(&excerpt(key.get_ref())), self.log.shown(value), bound);
             }
         }
+    }
+
+    fn children(&self, key: &str, rows: impl Iterator<Item = &'t Spanned<DeValue<'t>>>) -> Vec<Self> {
+        let row = |(i, row)| self.child(format!("{}[{}]", self.key(key), i + 1), Some(row));
+        rows.enumerate().map(row).collect()
     }
 
     fn child(&self, path: String, value: Option<&'t Spanned<DeValue<'t>>>) -> Self {
@@ -284,6 +297,20 @@ impl<'t> SectionReader<'t> {
         name.into()
     }
 
+    fn checked_choice<T: Copy>(
+        &self,
+        key: &str,
+        value: &Spanned<DeValue>,
+        options: &[(&str, T)],
+    ) -> Option<T> {
+        let name = value.get_ref().as_str();
+        let chosen = options.iter().find(|(option, _)| name == Some(option));
+        if chosen.is_none() {
+            self.reject(key, format!("must be {}", choice_bound(options)));
+        }
+        chosen.map(|(_, choice)| *choice)
+    }
+
     fn checked_integer(&self, key: &str, value: &Spanned<DeValue>, low: i32, high: i32) -> Option<i32> {
         let x = integer(value.get_ref()).filter(|x| (low..=high).contains(x));
         if x.is_none() {
@@ -326,6 +353,11 @@ impl<'t> SectionReader<'t> {
     fn add(&self, line: usize, key: String, value: Option<String>, bound: String) {
         self.log.violations.borrow_mut().push(Violation { line, key, value, bound });
     }
+}
+
+fn choice_bound<T>(options: &[(&str, T)]) -> String {
+    let names: Vec<_> = options.iter().map(|(option, _)| format!("\"{option}\"")).collect();
+    format!("one of {}", names.join(", "))
 }
 
 fn name_bound(longest: usize) -> String {

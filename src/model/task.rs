@@ -88,7 +88,7 @@ impl TaskState {
     /// State of a motion, the inverse of [`TaskState::motion`], with the triple of Bryan angles nearest to `near`. None near
     /// beta = +-90 deg, where alpha and gamma have no derivatives.
     ///
-    /// Conditioning: errors of the derivatives of alpha and gamma grow with `1 / cos(beta)`.
+    /// Conditioning: errors of the rates of alpha and gamma grow with `1 / cos(beta)`, those of their accelerations with its square.
     pub fn of_motion(motion: &Motion, near: &[f64; 6]) -> Option<Self> {
         let x = task_coordinates(&motion.pose, near);
         let [alpha, beta, ..] = x;

@@ -149,7 +149,7 @@ fn keys_are_refused_when_missing_unknown_or_of_the_wrong_shape() {
         "rod.transverse_inertia_kg_m2.x = 1: unknown key, must be one of: constant_kg_m2, quadratic_kg, \
          reference_length_m",
     );
-    let sections = "name, gravity_m_s2, platform, actuator, cylinder, rod, home, leg, realtime, limits, \
+    let sections = "name, gravity_m_s2, platform, actuator, cylinder, rod, home, leg, frame, realtime, limits, \
                     measured, drive, control, setpoint, timeouts, in_position, operator, plant, envelope";
     let unknown =
         |key: &str, probably: &str| format!("{key}: unknown key,{probably} must be one of: {sections}");

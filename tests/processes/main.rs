@@ -27,6 +27,7 @@ mod doubted;
 mod examined;
 mod excite;
 mod fidelity;
+mod frames;
 mod hosted;
 mod identify;
 mod in_force;

@@ -7,6 +7,7 @@
 //! The sandwich of each function: [`outcome::guard`] catches panics and keeps the text, [`client::with`] checks the handle.
 
 pub mod client;
+pub mod frames;
 pub mod outcome;
 pub mod request;
 

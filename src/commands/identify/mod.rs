@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use self::machine_file::{MachineFileError, changed_margins, difference, edited, write_new};
 use self::new_values::new_values;
 use self::recordings::Recorded;
 use self::report::{Delay, IdentificationReport, predicted};
 use super::failure::{CommandError, Failure};
+use super::machine_file::{changed_margins, difference, edited, write_new};
 use super::quantity::{length, list};
 use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
 use crate::analysis::identification::{Load, Run, identify, samples};
@@ -16,7 +16,6 @@ use crate::config::Config;
 use crate::model::machine::Machine;
 use crate::output::files::{print, print_json, write_whole};
 
-mod machine_file;
 mod new_values;
 mod page;
 mod quantities;
@@ -75,8 +74,6 @@ pub enum IdentifyError {
     #[error("--known-mass = {0} kg: must be greater than 0")]
     Weight(f64),
 }
-
-impl CommandError for MachineFileError {}
 
 impl CommandError for IdentifyError {
     fn has_begun(&self) -> bool {

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::machine_file::{Estimate, NewNumbers, NewValue};
 use super::report::Delay;
 use crate::analysis::identification::Identification;
+use crate::commands::machine_file::{Estimate, NewNumbers, NewValue};
 use crate::model::LEGS;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Gravity;

@@ -2,6 +2,7 @@
 //! the workspace.
 
 use crate::analysis::target_motion::{TargetRefusal, WorkspaceBound, check_target};
+use crate::commands::coordinates::Coordinates;
 use crate::commands::jog::keys::Key;
 use crate::commands::target::pose_of;
 use crate::control::constants::Constants;
@@ -34,6 +35,8 @@ pub enum Pace {
 pub struct JogTarget<'a> {
     constants: &'a Constants,
     digits: MotionDigits,
+    coordinates: &'a Coordinates,
+    /// X of the tool in the work frame.
     x: [f64; 6],
     is_continuous: bool,
     share: usize,
@@ -43,10 +46,17 @@ pub struct JogTarget<'a> {
 }
 
 impl<'a> JogTarget<'a> {
-    /// Target at X, in continuous motion.
-    pub fn new(constants: &'a Constants, digits: MotionDigits, x: [f64; 6]) -> Self {
+    /// Target at X of the platform, in continuous motion. Keys move the tool.
+    pub fn new(
+        constants: &'a Constants,
+        coordinates: &'a Coordinates,
+        digits: MotionDigits,
+        platform: [f64; 6],
+    ) -> Self {
+        let x = coordinates.tool_x(&platform);
         Self {
             constants,
+            coordinates,
             digits,
             x,
             is_continuous: true,
@@ -56,8 +66,9 @@ impl<'a> JogTarget<'a> {
         }
     }
 
+    /// X of the platform.
     pub fn x(&self) -> [f64; 6] {
-        self.x
+        self.coordinates.platform_x(&self.x)
     }
 
     pub fn blocked(&self) -> Option<&WorkspaceBound> {
@@ -111,7 +122,7 @@ impl<'a> JogTarget<'a> {
         if let Some(x) = x.get_mut(axis) {
             *x += by;
         }
-        let pose = pose_of(&x);
+        let pose = pose_of(&self.coordinates.platform_x(&x));
         let step = if self.is_continuous { 0.0 } else { by.abs() };
         if self.distance_ratio(reference, &pose, step) > 1.0 {
             return;
@@ -156,9 +167,10 @@ mod tests {
     #[test]
     fn a_target_stays_near_its_reference_and_in_the_workspace() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let constants = constants(&config);
+        let (constants, coordinates) = (constants(&config), Coordinates::default());
         let home = config.machine.home;
-        let mut target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), home);
+        let mut target =
+            JogTarget::new(&constants, &coordinates, MotionDigits::new(config.resolution()), home);
         let reference = pose_of(&home);
         for _ in 0..10_000 {
             assert_eq!(target.press(UP, &reference), Some(UP));
@@ -181,9 +193,10 @@ mod tests {
     #[test]
     fn a_step_is_one_step() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let constants = constants(&config);
+        let (constants, coordinates) = (constants(&config), Coordinates::default());
         let home = config.machine.home;
-        let mut target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), home);
+        let mut target =
+            JogTarget::new(&constants, &coordinates, MotionDigits::new(config.resolution()), home);
         assert_eq!(target.press(Key::Mode, &pose_of(&home)), None);
         assert_eq!(target.press(Key::Faster, &pose_of(&home)), None);
         let Pace::Step([position, angle]) = target.pace() else { panic!("{:?}", target.pace()) };

@@ -14,6 +14,7 @@ use self::keys::{Key, last_key};
 use self::screen::JogScreen;
 use self::terminal::Terminal;
 use super::arguments::{MachineFile, duration};
+use super::coordinates::{Coordinates, FrameOptions};
 use super::failure::Failure;
 use super::target::{TargetError, TargetSource, constants, pose_of};
 use crate::output::files::print;
@@ -39,6 +40,8 @@ const MAX_STEP_S: f64 = 0.02;
 pub struct JogArguments {
     #[command(flatten)]
     machine: MachineFile,
+    #[command(flatten)]
+    frames: FrameOptions,
     /// Take control, if the platform is not under control
     #[arg(long)]
     engage: bool,
@@ -54,18 +57,23 @@ impl JogArguments {
             return Err(Failure { exit_code: 2, message });
         }
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
-        let constants = constants(&config);
+        let (constants, coordinates) = (constants(&config), self.frames.coordinates(&config)?);
         let within = self.engage.then(|| Duration::from_secs_f64(self.within));
         let mut source = TargetSource::open(&config, within, &stop)?;
         let digits = MotionDigits::new(config.resolution());
-        let target = JogTarget::new(&constants, digits, source.resting_x(&constants)?);
-        jog(&mut source, target, &stop)?;
+        let target = JogTarget::new(&constants, &coordinates, digits, source.resting_x(&constants)?);
+        jog(&mut source, target, &coordinates, &stop)?;
         Ok(print("the platform stands under control; hexad stop or park ends it\n")?)
     }
 }
 
 /// Publishes a target moved by keys, until `q`, Esc or a signal.
-fn jog(source: &mut TargetSource, mut target: JogTarget, stop: &Stop) -> Result<(), Failure> {
+fn jog(
+    source: &mut TargetSource,
+    mut target: JogTarget,
+    coordinates: &Coordinates,
+    stop: &Stop,
+) -> Result<(), Failure> {
     let terminal = Terminal::open().map_err(|error| Failure { exit_code: 2, message: error.to_string() })?;
     let mut held: Option<(Key, Instant)> = None;
     let (mut moved, mut drawn) = (Instant::now(), None::<Instant>);
@@ -86,7 +94,8 @@ fn jog(source: &mut TargetSource, mut target: JogTarget, stop: &Stop) -> Result<
         }
         if drawn.is_none_or(|drawn| drawn.elapsed() > SCREEN_INTERVAL) {
             let answer = &source.status().newest.1;
-            terminal.draw(&JogScreen { answer, target: &target, held: held.map(|(key, _)| key) }.to_string());
+            let held = held.map(|(key, _)| key);
+            terminal.draw(&JogScreen { answer, target: &target, coordinates, held }.to_string());
             drawn = Some(now);
         }
     }

@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::jog_target::{JogTarget, Pace};
 use super::keys::Key;
+use crate::commands::coordinates::Coordinates;
 use crate::commands::status::screen::{legs, poses};
 use crate::operator::protocol::AnswerLine as Answer;
 use crate::output::numbers::{AXES, significant};
@@ -12,12 +13,13 @@ use crate::output::numbers::{AXES, significant};
 pub struct JogScreen<'a> {
     pub answer: &'a Answer,
     pub target: &'a JogTarget<'a>,
+    pub coordinates: &'a Coordinates,
     pub held: Option<Key>,
 }
 
 impl fmt::Display for JogScreen<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { answer, target, held } = self;
+        let Self { answer, target, coordinates, held } = self;
         let Some(report) = &answer.status else { return writeln!(f, "{}", answer.text) };
         let state = answer.state.to_uppercase();
         writeln!(
@@ -32,7 +34,7 @@ impl fmt::Display for JogScreen<'_> {
         writeln!(f, "{:.80}", format!("limits    {limits}"))?;
         let bound = target.blocked().map_or_else(|| "none".into(), ToString::to_string);
         writeln!(f, "{:.80}", format!("bound     {bound}"))?;
-        poses(f, report)?;
+        poses(f, &coordinates.report(report), &coordinates.label)?;
         legs(f, report)?;
         writeln!(f, "\nup/down   x w/s   y e/d   z r/f   alpha t/g   beta y/h   gamma u/j   leave q")?;
         let pace = match target.pace() {
@@ -70,10 +72,12 @@ mod tests {
     #[test]
     fn it_fits_the_smallest_terminal() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let constants = constants(&config);
-        let target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), config.machine.home);
+        let (constants, coordinates) = (constants(&config), Coordinates::default());
+        let digits = MotionDigits::new(config.resolution());
+        let target = JogTarget::new(&constants, &coordinates, digits, config.machine.home);
         let held = Some(Key::Move { axis: 5, sign: -1.0 });
-        let text = JogScreen { answer: &answer(), target: &target, held }.to_string();
+        let text =
+            JogScreen { answer: &answer(), target: &target, coordinates: &coordinates, held }.to_string();
         let widest = text.lines().map(|line| line.chars().count()).max();
         assert!(text.lines().count() <= 24 && widest <= Some(80), "{text}");
         for words in ["STOPPING", "force, force rate, stroke", "moving    z down", "setpoint", "1225.000"] {

@@ -19,6 +19,7 @@ use self::playback::{Playback, PlaybackStep};
 use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use super::arguments::{MachineFile, duration};
+use super::coordinates::FrameOptions;
 use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
 use super::orientation::{OrientationFormat, ROTATION_HELP};
 use super::plant::prepare_thread;
@@ -44,8 +45,8 @@ mod engagement;
 mod path;
 mod pause;
 mod playback;
-mod precheck;
-mod rate_change;
+pub(super) mod precheck;
+pub(super) mod rate_change;
 pub mod trajectory;
 
 #[derive(Debug, Args)]
@@ -56,6 +57,8 @@ pub struct MoveArguments {
     source: TrajectorySource,
     #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "pause", "resume"])]
     rotation: OrientationFormat,
+    #[command(flatten)]
+    frames: FrameOptions,
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
@@ -112,8 +115,15 @@ impl MoveArguments {
         if self.source.pause || self.source.resume {
             return Ok(pause::request(&config, self.source.pause)?);
         }
+        let coordinates = self.frames.coordinates(&config)?;
         let trajectory = match (&self.source.trajectory, self.source.motion) {
-            (Some(path), _) => Trajectory::from_file(&config, path, self.rotation)?,
+            (Some(path), _) => Trajectory::from_file(&config, &coordinates, path, self.rotation)?,
+            (None, _) if !self.frames.is_empty() => {
+                return Err(Failure {
+                    exit_code: 2,
+                    message: "--tool, --work: must go with --trajectory; the built-in motions are about home of the platform".into(),
+                });
+            }
             (None, motion) => {
                 Trajectory::built_in(&config, motion.unwrap_or(BuiltInMotion::Settle), self.seconds)?
             }

@@ -9,12 +9,14 @@ use super::SetpointError;
 use super::precheck::Precheck;
 use crate::analysis::excitation_design::design;
 use crate::analysis::sampled_loop::edge;
+use crate::commands::coordinates::Coordinates;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::commands::orientation::OrientationFormat;
 use crate::config::Config;
 use crate::model::task::TaskState;
 use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use crate::motion::excitation::Excitation;
+use crate::motion::frames::Frames;
 use crate::motion::trajectory::{Knot, interpolate};
 use crate::output::csv_table::{NumberTable, TableError, TableErrors};
 use crate::output::files::name_of;
@@ -39,6 +41,8 @@ pub enum Trajectory {
     BuiltIn(FittedMotion),
     Excitation(Box<Excitation>),
     Knots(Vec<Knot>),
+    /// Knots of a tool in a work frame, and home of the platform, near which its angles are.
+    Tool(Vec<Knot>, Box<Frames>, [f64; 6]),
 }
 
 impl Trajectory {
@@ -79,11 +83,20 @@ impl Trajectory {
     }
 
     /// A trajectory from a CSV file. It must begin and end at rest, its times must increase, and the daemon
-    /// must accept it.
-    pub fn from_file(config: &Config, path: &Path, format: OrientationFormat) -> Result<Self, SetpointError> {
-        let table = read_trajectory(path, format, &config.machine.home)?;
+    /// must accept it. Its columns are coordinates of a tool in a work frame, if these are given.
+    pub fn from_file(
+        config: &Config,
+        coordinates: &Coordinates,
+        path: &Path,
+        format: OrientationFormat,
+    ) -> Result<Self, SetpointError> {
+        let home = config.machine.home;
+        let table = read_trajectory(path, format, &coordinates.tool_x(&home))?;
         let path = name_of(path);
-        let trajectory = Self::from_rows(&table, path)?;
+        let trajectory = match (Self::from_rows(&table, path)?, coordinates.is_empty()) {
+            (Self::Knots(knots), false) => Self::Tool(knots, Box::new(coordinates.frames()), home),
+            (trajectory, _) => trajectory,
+        };
         trajectory.check(config, &table, path)?;
         Ok(trajectory)
     }
@@ -145,7 +158,9 @@ impl Trajectory {
         match self {
             Self::BuiltIn(scene) => scene.duration,
             Self::Excitation(excitation) => excitation.duration(),
-            Self::Knots(knots) => knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t),
+            Self::Knots(knots) | Self::Tool(knots, ..) => {
+                knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t)
+            }
         }
     }
 
@@ -154,11 +169,19 @@ impl Trajectory {
         match self {
             Self::BuiltIn(scene) => scene.at(t),
             Self::Excitation(excitation) => excitation.at(t),
-            Self::Knots(knots) => {
-                interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
+            Self::Knots(knots) => at_knots(knots, t),
+            Self::Tool(knots, frames, home) => {
+                let platform = frames.platform_motion(&at_knots(knots, t).motion());
+                // Without rates the zeros are refused.
+                TaskState::of_motion(&platform, home).unwrap_or_default()
             }
         }
     }
+}
+
+/// The state `t` seconds after the first knot.
+fn at_knots(knots: &[Knot], t: f64) -> TaskState {
+    interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
 }
 
 /// Largest share of a motion's amplitude, at most 1, with which the daemon accepts the whole motion with reserve.

@@ -9,8 +9,10 @@ use clap::Args;
 
 use self::screen::Screen;
 use super::arguments::OptionalMachineFile;
+use super::coordinates::{Coordinates, FrameOptions};
 use super::failure::Failure;
 use super::request::machine_name;
+use crate::config::Config;
 use crate::operator::protocol::AnswerLine;
 use crate::operator::requests;
 use crate::output::files::print;
@@ -35,8 +37,10 @@ pub struct StatusArguments {
     /// Show it again and again, until Ctrl-C
     #[arg(long, requires = "OptionalMachineFile")]
     watch: bool,
-    /// Print the daemon's answer as JSON, one line for each
-    #[arg(long)]
+    #[command(flatten)]
+    frames: FrameOptions,
+    /// Print the daemon's answer as JSON, one line for each; its coordinates are those of the platform in the base frame
+    #[arg(long, conflicts_with_all = ["tool", "work"])]
     json: bool,
 }
 
@@ -44,20 +48,29 @@ impl StatusArguments {
     pub fn execute(self) -> Result<(), Failure> {
         match self.machine.path() {
             Some(path) => self.show_machine(path),
+            None if !self.frames.is_empty() => Err(Failure {
+                exit_code: 2,
+                message: "--tool, --work: name the machine file that has the frames".into(),
+            }),
             None => hosted::show(self.json),
         }
     }
 
     fn show_machine(&self, path: &Path) -> Result<(), Failure> {
         let machine = machine_name(path)?;
+        // Without frames the machine may be named without its file.
+        let coordinates = match self.frames.is_empty() {
+            true => Coordinates::default(),
+            false => self.frames.coordinates(&Config::load(path)?)?,
+        };
         if !self.watch {
-            return self.show(&requests::status(&machine)?, false);
+            return self.show(requests::status(&machine)?, &coordinates, false);
         }
         let stop = Stop::on_signals()?;
         let is_terminal = io::stdout().is_terminal();
         while !stop.is_requested() {
             match requests::status(&machine) {
-                Ok(answer) => self.show(&answer, is_terminal)?,
+                Ok(answer) => self.show(answer, &coordinates, is_terminal)?,
                 // The daemon may be restarting.
                 Err(error) if is_terminal && !self.json => {
                     print(format_args!("{HOME}hexad: {error}{CLEAR_LINE}\n{CLEAR_BELOW}"))?;
@@ -69,11 +82,12 @@ impl StatusArguments {
         Ok(())
     }
 
-    fn show(&self, answer: &AnswerLine, in_place: bool) -> Result<(), Failure> {
+    fn show(&self, mut answer: AnswerLine, coordinates: &Coordinates, in_place: bool) -> Result<(), Failure> {
         if self.json {
             return Ok(print(answer.to_line())?);
         }
-        let text = Screen(answer).to_string();
+        answer.status = answer.status.map(|report| Box::new(coordinates.report(&report)));
+        let text = Screen(&answer, &coordinates.label).to_string();
         if !in_place {
             return Ok(print(text)?);
         }

@@ -19,12 +19,12 @@ const BAR: usize = 26;
 /// Longest time to a singular pose that is shown \[s\]. The motion will change within a longer one.
 const MAX_TIME_TO_SINGULARITY_S: f64 = 100.0;
 
-/// Status as text for the screen.
-pub struct Screen<'a>(pub &'a AnswerLine);
+/// Status as text for the screen, with a label of the coordinates.
+pub struct Screen<'a>(pub &'a AnswerLine, pub &'a str);
 
 impl fmt::Display for Screen<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(answer) = self;
+        let Self(answer, label) = self;
         let Some(report) = &answer.status else { return writeln!(f, "{}", answer.text) };
         let age = report
             .age_s
@@ -44,7 +44,7 @@ impl fmt::Display for Screen<'_> {
             .iter()
             .try_for_each(|warning| write!(f, "{}", paragraph("warning: ", warning, WIDTH)))?;
         timing(f, report)?;
-        poses(f, report)?;
+        poses(f, report, label)?;
         legs(f, report)?;
         singularity(f, report)?;
         report.sources.iter().try_for_each(|source| writeln!(f, "{}", source_line(source)))?;
@@ -94,8 +94,13 @@ fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     )
 }
 
-pub(in crate::commands) fn poses(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
-    write!(f, "\n{:10}", "")?;
+/// Poses and their error, with a label of the coordinates.
+pub(in crate::commands) fn poses(
+    f: &mut fmt::Formatter<'_>,
+    report: &StatusReport,
+    label: &str,
+) -> fmt::Result {
+    write!(f, "{label}\n{:10}", "")?;
     for (k, axis) in AXES.iter().enumerate() {
         write!(f, "{:>11}", format!("{axis} {}", axis_unit(k).1))?;
     }
@@ -265,7 +270,7 @@ pub(in crate::commands) mod tests {
     fn it_fits_the_smallest_terminal() {
         let mut answer = answer();
         for known in [true, false] {
-            let text = Screen(&answer).to_string();
+            let text = Screen(&answer, "").to_string();
             let widest = text.lines().map(|line| line.chars().count()).max();
             assert!(text.lines().count() <= 24 && widest <= Some(WIDTH), "{text}");
             if !known {
@@ -282,7 +287,7 @@ pub(in crate::commands) mod tests {
 
     #[test]
     fn numbers_are_in_millimetres_and_degrees_and_bars_in_proportion() {
-        let text = Screen(&answer()).to_string();
+        let text = Screen(&answer(), "").to_string();
         let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
         let pose: Vec<_> = line("pose").split_whitespace().map(String::from).collect();
         assert_eq!(pose, ["pose", "-177.6169", "177.6169", "0.0000", "-1234.568", "1100.000", "0.000"]);
@@ -297,9 +302,9 @@ pub(in crate::commands) mod tests {
         let mut answer = answer();
         (answer.state, answer.diagnostic.code) = ("engaging".into(), 0);
         let words = "\nthe setpoint is 12.3 mm and 1.23 mrad away\n";
-        assert!(Screen(&answer).to_string().contains(words), "{}", Screen(&answer));
+        assert!(Screen(&answer, "").to_string().contains(words), "{}", Screen(&answer, ""));
         answer.status.as_mut().unwrap().in_position = Some(true);
-        assert!(Screen(&answer).to_string().contains("\nin position\n"), "{}", Screen(&answer));
+        assert!(Screen(&answer, "").to_string().contains("\nin position\n"), "{}", Screen(&answer, ""));
     }
 
     #[test]
@@ -310,7 +315,7 @@ pub(in crate::commands) mod tests {
         report.resolution = [1e-9, 1.4e-8];
         report.pose = Some([0.0, 0.0, 1e-6, 0.0, 25e-6, 0.135_012]);
         report.legs = vec![LegReport { length_m: 0.083_351_2, rate_m_s: Some(-0.01), force_n: -250.0 }; 6];
-        let text = Screen(&answer).to_string();
+        let text = Screen(&answer, "").to_string();
         for words in ["0.000057", "0.025000", "135.012000", "83.3037 ", " 83.4037 ", "83.351200", "-10.0000"]
         {
             assert!(text.contains(words), "{words}: {text}");

@@ -21,6 +21,16 @@ pub enum TargetError {
     Operator(#[from] OperatorError),
     #[error(transparent)]
     Refused(#[from] TargetRefusal),
+    #[error("{0}\n{1}")]
+    RefusedInFrames(TargetRefusal, String),
+    #[error(
+        "the daemon would not follow the straight way of the tool, even within {0:.1} s: at {1}; go by another pose, or without --tool"
+    )]
+    NotFollowable(f64, String),
+    #[error(
+        "beta of the platform passes 90 deg on the way, where the angles have no rates; go by another pose, or without --tool"
+    )]
+    AngleRates,
     #[error("the machine runs in simulated time, in which no person moves it; use hexad move")]
     Simulated,
     #[error("{0} publishes setpoints; end it first (hexad stop, or Ctrl-C there)")]
@@ -72,7 +82,8 @@ impl fmt::Display for Deviation {
 impl CommandError for TargetError {
     fn has_begun(&self) -> bool {
         match self {
-            Self::Port(_) | Self::Refused(_) | Self::Simulated => false,
+            Self::Port(_) | Self::Refused(_) | Self::RefusedInFrames(..) | Self::Simulated => false,
+            Self::NotFollowable(..) | Self::AngleRates => false,
             Self::Operator(error) => error.has_begun(),
             _ => true,
         }

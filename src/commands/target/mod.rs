@@ -216,14 +216,27 @@ impl<'a> TargetSource<'a> {
         Ok(task_coordinates(&pose, &self.config.machine.home))
     }
 
+    /// Instant of the next setpoint \[ns\].
+    pub fn next_ns(&self) -> u64 {
+        self.tick_ns
+    }
+
     /// Waits for the next instant of the loop and publishes a target. An error if control has ended.
     pub fn publish(&mut self, x: [f64; 6]) -> Result<(), TargetError> {
+        let motion = Setpoint::motion(self.tick_ns, TaskState::at_rest(x));
+        self.send(&Setpoint { kind: SetpointKind::Target, target_speed: self.speed, ..motion })
+    }
+
+    /// The same with a motion, which is followed as it is.
+    pub fn publish_motion(&mut self, task: TaskState) -> Result<(), TargetError> {
+        self.send(&Setpoint::motion(self.tick_ns, task))
+    }
+
+    fn send(&mut self, setpoint: &Setpoint) -> Result<(), TargetError> {
         sleep_until(self.tick_ns);
-        let task = TaskState::at_rest(x);
-        let setpoint =
-            Setpoint { kind: SetpointKind::Target, time_ns: self.tick_ns, task, target_speed: self.speed };
-        self.setpoints.publish(self.tick_ns, (&setpoint).into())?;
+        self.setpoints.publish(self.tick_ns, setpoint.into())?;
         self.tick_ns = self.grid.next_after(self.tick_ns.max(monotonic_ns()));
+        let x = setpoint.task.x.into();
         if self.published.is_none_or(|(published, _)| published != x) {
             self.published = Some((x, Instant::now()));
         }
@@ -260,14 +273,16 @@ impl<'a> TargetSource<'a> {
         if let Some(error) = error {
             return Err(TargetError::Ended("an unknown state".into(), error));
         }
-        if requested < since.max(published) {
+        if requested < since {
             return Ok(());
         }
         if !has_control(&answer) || [State::Stopping, State::Parking].iter().any(|s| s.name() == answer.state)
         {
             return Err(TargetError::Ended(answer.state, answer.text));
         }
-        if !has_received(&answer, &x) && published.max(since).elapsed() > FOLLOWING_LIMIT {
+        // An older status has another setpoint.
+        let is_new = requested >= published;
+        if is_new && !has_received(&answer, &x) && published.max(since).elapsed() > FOLLOWING_LIMIT {
             return Err(TargetError::NotFollowed);
         }
         Ok(())

@@ -5,7 +5,7 @@ use clap::Args;
 use crate::commands::quantity::{angle, length};
 
 #[derive(Clone, Copy, Debug, Default, Args)]
-#[command(next_help_heading = "Target, X of the base frame; what is not given stays as it is")]
+#[command(next_help_heading = "Target, X of the platform or of --tool; what is not given stays as it is")]
 pub struct PoseOptions {
     /// x, with its unit: m, mm, um, nm
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]

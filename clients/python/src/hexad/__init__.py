@@ -7,20 +7,25 @@
 
     MyDriver("fried2008").run()        # `name` of the machine file
 
-A program that only publishes or receives uses `Client`; an operator's panel uses `request`.
+A program that only publishes or receives uses `Client`; an operator's panel uses `request`. `Frames` turns poses of a tool into poses of the
+platform.
 """
 
 from .client import Client, HexadError, Result, Role, judge, monotonic_ns, request, view
 from .driver import Driver, sleep_until
+from .frames import Frames, motion_of, setpoint_of
 from .messages import Command, Force, Measured, Setpoint, Statistics, Status
+from .motion import Motion
 
 __all__ = [
     "Client",
     "Command",
     "Driver",
     "Force",
+    "Frames",
     "HexadError",
     "Measured",
+    "Motion",
     "Result",
     "Role",
     "Setpoint",
@@ -28,7 +33,9 @@ __all__ = [
     "Status",
     "judge",
     "monotonic_ns",
+    "motion_of",
     "request",
+    "setpoint_of",
     "sleep_until",
     "view",
 ]

@@ -5,6 +5,7 @@ import pathlib
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_uint32, c_uint64, c_void_p
 
 from .messages import Force, Measured, Setpoint, Statistics, Status
+from .motion import FrameStruct, Motion
 
 # Version of the ABI that this package was written for: libhexad.so.0.
 ABI = 0
@@ -21,6 +22,10 @@ _FUNCTIONS = {
     "hexad_latest_status": [c_void_p, POINTER(Status)],
     "hexad_latest_statistics": [c_void_p, POINTER(Statistics)],
     "hexad_latest_measured": [c_void_p, POINTER(Measured)],
+    "hexad_tool_motion": [POINTER(FrameStruct), POINTER(Motion), POINTER(Motion)],
+    "hexad_platform_motion": [POINTER(FrameStruct), POINTER(Motion), POINTER(Motion)],
+    "hexad_setpoint_of_motion": [POINTER(Motion), POINTER(Setpoint)],
+    "hexad_motion_of_setpoint": [POINTER(Setpoint), POINTER(Motion)],
     "hexad_request": [c_char_p, c_uint32, c_bool, c_double],
 }
 

@@ -6,8 +6,8 @@ use toml::{Table, Value};
 use super::*;
 use crate::config::Config;
 
-const REFERENCE: &str = include_str!("../../../../config/reference.toml");
-const TILTED: &str = include_str!("../../../../tests/data/tilted.toml");
+const REFERENCE: &str = include_str!("../../../config/reference.toml");
+const TILTED: &str = include_str!("../../../tests/data/tilted.toml");
 
 type Path = &'static [&'static str];
 

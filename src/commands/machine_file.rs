@@ -1,4 +1,4 @@
-//! New machine file: the text of the file in force with other numbers.
+//! New machine file: the text of the file in force with other numbers, or with a frame.
 //!
 //! The parser locates each number; only those characters, and a comment behind them, are replaced. So order, comments,
 //! indentation, line ends and every other number stay as they are.
@@ -14,12 +14,15 @@ use self::change_comment::ChangeComment;
 pub use self::difference::{changed_margins, difference};
 use self::estimate::array;
 pub use self::estimate::{Estimate, NewNumbers, NewValue};
+pub use self::frame::with_frame;
+use super::failure::CommandError;
 use crate::config::number;
 use crate::output::files::{FileError, is_standard, write_whole};
 
 mod change_comment;
 mod difference;
 mod estimate;
+mod frame;
 #[cfg(test)]
 mod tests;
 
@@ -63,6 +66,8 @@ pub enum MachineFileError {
     #[error(transparent)]
     File(#[from] FileError),
 }
+
+impl CommandError for MachineFileError {}
 
 /// Text of a machine file with new values.
 ///

@@ -1,0 +1,142 @@
+//! Frames of a command: the coordinates that it reads and shows are those of a tool in a work frame.
+
+use clap::Args;
+
+use super::failure::CommandError;
+use super::target::pose_of;
+use crate::config::Config;
+use crate::config::frames::UnknownFrames;
+use crate::model::rigid::Twist;
+use crate::model::task::task_coordinates;
+use crate::motion::frames::Frames;
+use crate::operator::status_report::StatusReport;
+
+#[derive(Clone, Debug, Default, Args)]
+pub struct FrameOptions {
+    /// Coordinates are those of this tool frame of the machine file, and rotations are about its origin; without it, the platform
+    #[arg(long, value_name = "NAME")]
+    pub tool: Option<String>,
+    /// Coordinates are in this work frame of the machine file; without it, in the base frame
+    #[arg(long, value_name = "NAME")]
+    pub work: Option<String>,
+}
+
+impl FrameOptions {
+    pub fn is_empty(&self) -> bool {
+        self.tool.is_none() && self.work.is_none()
+    }
+
+    /// The frames of a machine file with these names.
+    pub fn coordinates(&self, config: &Config) -> Result<Coordinates, UnknownFrames> {
+        let frames = config.frames_named(self.tool.as_deref(), self.work.as_deref())?;
+        let home = task_coordinates(&frames.tool_pose(&config.machine.home_pose()), &config.machine.home);
+        let frame = |name: &Option<String>, default: &str| name.clone().unwrap_or_else(|| default.into());
+        let (tool, work) = (frame(&self.tool, "the platform"), frame(&self.work, "the base frame"));
+        let label = if self.is_empty() { String::new() } else { format!("coordinates of {tool} in {work}") };
+        Ok(Coordinates {
+            frames: (!self.is_empty()).then_some(frames),
+            homes: [config.machine.home, home],
+            label,
+        })
+    }
+}
+
+impl CommandError for UnknownFrames {}
+
+/// Coordinates of a tool in a work frame. Without frames X stays as it is, to the bit.
+#[derive(Clone, Debug, Default)]
+pub struct Coordinates {
+    frames: Option<Frames>,
+    /// Home of the platform and of the tool: X near which the angles are.
+    homes: [[f64; 6]; 2],
+    /// Text of what has these coordinates; empty without frames.
+    pub label: String,
+}
+
+impl Coordinates {
+    /// Whether X is that of the platform in the base frame.
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_none()
+    }
+
+    pub fn frames(&self) -> Frames {
+        self.frames.unwrap_or_default()
+    }
+
+    /// X of the tool in the work frame.
+    pub fn tool_x(&self, platform: &[f64; 6]) -> [f64; 6] {
+        let [_, home] = &self.homes;
+        self.frames.map_or(*platform, |frames| task_coordinates(&frames.tool_pose(&pose_of(platform)), home))
+    }
+
+    /// X of the platform in the base frame.
+    pub fn platform_x(&self, tool: &[f64; 6]) -> [f64; 6] {
+        let [home, _] = &self.homes;
+        self.frames.map_or(*tool, |frames| task_coordinates(&frames.platform_pose(&pose_of(tool)), home))
+    }
+
+    /// A status report with the coordinates and errors of the tool.
+    pub fn report(&self, report: &StatusReport) -> StatusReport {
+        let Some(frames) = self.frames else { return report.clone() };
+        let in_work = |x: Option<[f64; 6]>| x.map(|x| self.tool_x(&x));
+        let error = report.pose.zip(report.orientation_error_rad).zip(report.position_error_m);
+        let error = error.map(|((pose, angular), linear)| {
+            let pose = pose_of(&pose);
+            let reference = pose.displaced(&Twist { angular: angular.into(), linear: linear.into() });
+            frames.tool_pose(&pose).displacement_to(&frames.tool_pose(&reference))
+        });
+        StatusReport {
+            pose: in_work(report.pose),
+            setpoint: in_work(report.setpoint),
+            target: in_work(report.target),
+            orientation_error_rad: error.map(|error| error.angular.into()),
+            position_error_m: error.map(|error| error.linear.into()),
+            ..report.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+
+    const FRAMES: &str = "[[frame]]\nname = 'vertex'\nkind = 'tool'\npose = [0, 0, 0, 0.35, 0, 0]\n\
+                          [[frame]]\nname = 'optics'\nkind = 'work'\npose = [0, 0, 1.5707963267948966, 1, 0, 0]\n";
+
+    fn coordinates(tool: Option<&str>, work: Option<&str>) -> Coordinates {
+        let config = Config::parse(&format!("{DEFAULT_CONFIG}\n{FRAMES}"), "a test").unwrap();
+        FrameOptions { tool: tool.map(Into::into), work: work.map(Into::into) }.coordinates(&config).unwrap()
+    }
+
+    #[test]
+    fn coordinates_are_those_of_the_tool_in_the_work_frame() {
+        let coordinates = coordinates(Some("vertex"), Some("optics"));
+        assert_eq!(coordinates.label, "coordinates of vertex in optics");
+        // Home is 1.1 m along x; x of the base is -y of the work frame, whose origin is 1 m along it.
+        let home = coordinates.tool_x(&[0.0, 0.0, 0.0, 1.1, 0.0, 0.0]);
+        let wanted = [0.0, 0.0, -core::f64::consts::FRAC_PI_2, 0.0, -0.45, 0.0];
+        assert!(home.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-15), "{home:?}");
+        let x = [0.1, -0.2, 0.3, 0.01, -0.4, 0.05];
+        assert!(
+            coordinates.tool_x(&coordinates.platform_x(&x)).iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-14)
+        );
+    }
+
+    #[test]
+    fn a_report_has_the_error_of_the_tool() {
+        let report = StatusReport {
+            pose: Some([0.0, 0.0, 0.0, 1.1, 0.0, 0.0]),
+            position_error_m: Some([0.0; 3]),
+            orientation_error_rad: Some([0.0, 0.0, 1e-3]),
+            ..StatusReport::default()
+        };
+        // Turned by a milliradian about z of the base: the tool goes 0.35 mm along y of the base, which is x of the work frame.
+        let found = coordinates(Some("vertex"), Some("optics")).report(&report);
+        let [x, y, z] = found.position_error_m.unwrap();
+        assert!((x - 0.35e-3).abs() < 1e-9 && y.abs() < 1e-6 && z == 0.0, "{x} {y} {z}");
+        assert!((found.orientation_error_rad.unwrap()[2] - 1e-3).abs() < 1e-12);
+        assert_eq!(found.setpoint, None);
+        assert_eq!(format!("{:?}", coordinates(None, None).report(&report)), format!("{report:?}"));
+    }
+}

@@ -1,0 +1,173 @@
+//! `hexad frame`: the named frames of a machine file, and a new file with a frame where the platform is.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::arguments::MachineFile;
+use super::coordinates::FrameOptions;
+use super::failure::{CommandError, Failure};
+use super::machine_file::{difference, with_frame, write_new};
+use super::target::{TargetError, pose_of, reference_x};
+use crate::config::Config;
+use crate::config::frames::{FrameKind, NamedFrame};
+use crate::model::rigid::Pose;
+use crate::model::task::task_coordinates;
+use crate::motion::frames::Frames;
+use crate::operator::requests::status;
+use crate::output::files::print;
+use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed};
+use crate::output::text_table::{Left, Right, text_table};
+
+#[derive(Debug, Args)]
+pub struct FrameArguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Show the frames of a machine file
+    List(MachineFile),
+    /// Write a new machine file with a frame where the platform is now
+    Set(SetArguments),
+}
+
+#[derive(Debug, Args)]
+struct SetArguments {
+    /// Name of the frame, of the file or new
+    #[arg(value_name = "NAME")]
+    name: String,
+    #[command(flatten)]
+    machine: MachineFile,
+    /// Where the platform is now: under control its reference, else the measured pose
+    #[arg(long, required = true)]
+    here: bool,
+    /// Kind of a new frame
+    ///
+    /// A work frame is set to where the platform, or --tool, is in the base frame. A tool frame is set to the frame of the platform
+    /// that is now where the base frame, or --work, is.
+    #[arg(long, value_enum)]
+    kind: Option<FrameKind>,
+    #[command(flatten)]
+    frames: FrameOptions,
+    /// New machine file
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Reason why no frame is set.
+#[derive(Debug, thiserror::Error)]
+enum FrameError {
+    #[error("{place}: no frame is named {name:?}; --kind tool or --kind work makes a new one")]
+    NoKind { place: String, name: String },
+    #[error(
+        "{place}: {name:?} is a {kind} frame, not a {wanted} frame; choose another name, or leave out --kind"
+    )]
+    OtherKind { place: String, name: String, kind: FrameKind, wanted: FrameKind },
+    #[error("a {kind} frame is set from a {other} frame: --{kind} must be left out")]
+    SameKind { kind: FrameKind, other: FrameKind },
+}
+
+impl CommandError for FrameError {}
+
+impl FrameArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        match self.action {
+            Action::List(machine) => Ok(print(table(&machine.load()?))?),
+            Action::Set(arguments) => arguments.execute(),
+        }
+    }
+}
+
+impl SetArguments {
+    fn execute(self) -> Result<(), Failure> {
+        let config = self.machine.load()?;
+        let kind = self.kind(&config)?;
+        let frames = config.frames_named(self.frames.tool.as_deref(), self.frames.work.as_deref())?;
+        let answer = status(&config.name)?;
+        let here = reference_x(&config, &answer).ok_or(TargetError::UnknownPose(answer.text))?;
+        let x = task_coordinates(&frame_here(&frames, kind, &pose_of(&here)), &[0.0; 6]);
+        let text = with_frame(&config.text, &NamedFrame { name: self.name, kind, x })?;
+        Config::parse(&text, "the new machine file")?;
+        write_new(&self.output, &text)?;
+        let lines = difference(&config.text, &text);
+        Ok(print(format_args!("{lines}\n{}: written\n", self.output.display()))?)
+    }
+
+    /// Kind of the frame of the file with this name, else of the option.
+    fn kind(&self, config: &Config) -> Result<FrameKind, FrameError> {
+        let (place, name) = (config.place.clone(), self.name.clone());
+        let found = config.frames.iter().find(|frame| frame.name == name).map(|frame| frame.kind);
+        let kind = match (found, self.kind) {
+            (Some(kind), Some(wanted)) if kind != wanted => {
+                return Err(FrameError::OtherKind { place, name, kind, wanted });
+            }
+            (None, None) => return Err(FrameError::NoKind { place, name }),
+            (Some(kind), _) | (None, Some(kind)) => kind,
+        };
+        match (kind, &self.frames) {
+            (FrameKind::Tool, FrameOptions { tool: Some(_), .. }) => {
+                Err(FrameError::SameKind { kind, other: FrameKind::Work })
+            }
+            (FrameKind::Work, FrameOptions { work: Some(_), .. }) => {
+                Err(FrameError::SameKind { kind, other: FrameKind::Tool })
+            }
+            _ => Ok(kind),
+        }
+    }
+}
+
+/// The frame in which the tool's pose is zero now.
+fn frame_here(frames: &Frames, kind: FrameKind, platform: &Pose) -> Pose {
+    match kind {
+        FrameKind::Work => Frames { tool: frames.tool, ..Frames::default() }.tool_pose(platform),
+        // Seen from the platform, the work frame is a tool.
+        FrameKind::Tool => Frames { tool: frames.work, work: *platform }.tool_pose(&Frames::default().work),
+    }
+}
+
+/// A line for each frame.
+fn table(config: &Config) -> String {
+    if config.frames.is_empty() {
+        return format!(
+            "{}: no [[frame]]; hexad frame set NAME --here --kind tool|work adds one\n",
+            config.place
+        );
+    }
+    let digits = MotionDigits::new(config.resolution());
+    let names: Vec<_> =
+        (0..6).map(|k| format!("{} {}", AXES.get(k).unwrap_or(&""), axis_unit(k).1)).collect();
+    let columns: Vec<_> = [("frame", Left), ("kind", Left)]
+        .into_iter()
+        .chain(names.iter().map(|name| (name.as_str(), Right)))
+        .collect();
+    let rows = config.frames.iter().map(|NamedFrame { name, kind, x }| {
+        let numbers = x.iter().enumerate().map(|(k, x)| fixed(x * axis_unit(k).0, digits.of_axis(k)));
+        [name.clone(), kind.to_string()].into_iter().chain(numbers).collect::<Vec<_>>()
+    });
+    text_table(2, &columns, rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coordinates_are_zero_in_a_frame_that_was_set_here() {
+        let platform = pose_of(&[0.1, -0.2, 0.3, 0.4, 0.5, 0.6]);
+        let frames = Frames {
+            tool: pose_of(&[0.3, 0.2, 0.1, 0.0, 0.1, 0.35]),
+            work: pose_of(&[-0.3, 0.5, 1.1, 0.2, -0.1, 0.9]),
+        };
+        for kind in [FrameKind::Work, FrameKind::Tool] {
+            let here = frame_here(&frames, kind, &platform);
+            let set = match kind {
+                FrameKind::Work => Frames { work: here, ..frames },
+                FrameKind::Tool => Frames { tool: here, ..frames },
+            };
+            let x = task_coordinates(&set.tool_pose(&platform), &[0.0; 6]);
+            assert!(x.iter().all(|x| x.abs() < 1e-15), "{kind}: {x:?}");
+        }
+    }
+}
