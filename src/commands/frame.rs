@@ -60,13 +60,13 @@ struct SetArguments {
 #[derive(Debug, thiserror::Error)]
 enum FrameError {
     #[error("{place}: no frame is named {name:?}; --kind tool or --kind work makes a new one")]
-    NoKind { place: String, name: String },
+    Unknown { place: String, name: String },
     #[error(
         "{place}: {name:?} is a {kind} frame, not a {wanted} frame; choose another name, or leave out --kind"
     )]
-    OtherKind { place: String, name: String, kind: FrameKind, wanted: FrameKind },
+    Mismatch { place: String, name: String, kind: FrameKind, wanted: FrameKind },
     #[error("a {kind} frame is set from a {other} frame: --{kind} must be left out")]
-    SameKind { kind: FrameKind, other: FrameKind },
+    NotUsed { kind: FrameKind, other: FrameKind },
 }
 
 impl CommandError for FrameError {}
@@ -101,17 +101,17 @@ impl SetArguments {
         let found = config.frames.iter().find(|frame| frame.name == name).map(|frame| frame.kind);
         let kind = match (found, self.kind) {
             (Some(kind), Some(wanted)) if kind != wanted => {
-                return Err(FrameError::OtherKind { place, name, kind, wanted });
+                return Err(FrameError::Mismatch { place, name, kind, wanted });
             }
-            (None, None) => return Err(FrameError::NoKind { place, name }),
+            (None, None) => return Err(FrameError::Unknown { place, name }),
             (Some(kind), _) | (None, Some(kind)) => kind,
         };
         match (kind, &self.frames) {
             (FrameKind::Tool, FrameOptions { tool: Some(_), .. }) => {
-                Err(FrameError::SameKind { kind, other: FrameKind::Work })
+                Err(FrameError::NotUsed { kind, other: FrameKind::Work })
             }
             (FrameKind::Work, FrameOptions { work: Some(_), .. }) => {
-                Err(FrameError::SameKind { kind, other: FrameKind::Tool })
+                Err(FrameError::NotUsed { kind, other: FrameKind::Tool })
             }
             _ => Ok(kind),
         }

@@ -24,10 +24,10 @@ const ARM_M: f64 = 0.35;
 /// 30 arcsec.
 const TURN_RAD: f64 = 30.0 * core::f64::consts::PI / 180.0 / 3600.0;
 /// Rest before the first mean, and from the end of the motion to the second \[s\].
-const SETTLING_S: f64 = 3.0;
+const SETTLING_S: f64 = 2.0;
 const MEAN_S: f64 = 1.0;
 /// Noises that are tried.
-const SEEDS: u64 = 8;
+const SEEDS: u64 = 4;
 
 const VERTEX: &str = "[[frame]]\nname = \"vertex\"\nkind = \"tool\"\npose = [0, 0, 0, 0, 0, 0.35]\n";
 

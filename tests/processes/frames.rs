@@ -23,8 +23,10 @@ name = \"table\"
 kind = \"work\"
 pose = [0.0, 0.0, 0.0, 1.4, 0.0, 0.0]
 [envelope]
-pose_min = [-0.5, -0.5, -0.5, 1.0, -0.2, -0.2]
-pose_max = [0.5, 0.5, 0.5, 1.2, 0.2, 0.2]
+pose_min = [-0.2, -0.2, -0.2, -0.1, -0.1, -0.1]
+pose_max = [0.2, 0.2, 0.2, 0.1, 0.1, 0.1]
+velocity = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
+acceleration = [0.3, 0.3, 0.3, 0.3, 0.3, 0.3]
 ";
 
 fn hexad(machine: &Machine, command: &[&str], more: &[&str]) -> Ended {

@@ -63,6 +63,24 @@ enum hexad_result {
 // A program that has joined the topics of a machine.
 struct hexad_client;
 
+// A tool frame and a work frame, as [[frame]] of the machine file: X of their axes and origins. Zeros: the platform, the base.
+struct hexad_frames {
+  // The tool frame in the platform frame. [rad, m]
+  double tool[6];
+  // The work frame in the base frame. [rad, m]
+  double work[6];
+};
+
+// Motion at one instant, of the platform in the base frame or of a tool in a work frame, in the axes of that frame.
+struct hexad_motion {
+  // X: alpha, beta, gamma, then the origin. [rad, m]
+  double x[6];
+  // omega, then the velocity of the origin. [rad/s, m/s]
+  double twist[6];
+  // omega', then the acceleration of the origin. [rad/s^2, m/s^2]
+  double acceleration[6];
+};
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -181,6 +199,40 @@ enum hexad_result hexad_request(const char *machine,
                                 uint32_t request,
                                 bool until_ready,
                                 double within_s);
+
+// Motion of the tool in the work frame while the platform moves so in the base frame. The angles are those nearest to zero.
+//
+// # Safety
+//
+// `frames` is NULL or frames, `platform` is NULL or a motion, `tool` is NULL or room for one; both may be the same.
+enum hexad_result hexad_tool_motion(const struct hexad_frames *frames,
+                                    const struct hexad_motion *platform,
+                                    struct hexad_motion *tool);
+
+// Motion of the platform in the base frame with which the tool moves so in the work frame: the inverse of hexad_tool_motion.
+//
+// # Safety
+//
+// `frames` is NULL or frames, `tool` is NULL or a motion, `platform` is NULL or room for one; both may be the same.
+enum hexad_result hexad_platform_motion(const struct hexad_frames *frames,
+                                        const struct hexad_motion *tool,
+                                        struct hexad_motion *platform);
+
+// Fills in x, x_rate and x_accel of a setpoint, and leaves the rest. HEXAD_INVALID at beta = 90 deg, where angles have no rates.
+//
+// # Safety
+//
+// `motion` is NULL or a motion; `setpoint` is NULL or a message.
+enum hexad_result hexad_setpoint_of_motion(const struct hexad_motion *motion,
+                                           struct hexad_setpoint *setpoint);
+
+// Motion of a setpoint: the inverse of hexad_setpoint_of_motion.
+//
+// # Safety
+//
+// `setpoint` is NULL or a message; `motion` is NULL or room for a motion.
+enum hexad_result hexad_motion_of_setpoint(const struct hexad_setpoint *setpoint,
+                                           struct hexad_motion *motion);
 
 #ifdef __cplusplus
 }  // extern "C"

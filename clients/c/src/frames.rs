@@ -55,25 +55,27 @@ fn pose(x: &[f64; 6]) -> Pose {
     TaskState::at_rest(*x).motion().pose
 }
 
-fn frames(frames: &hexad_frames) -> Frames {
-    Frames { tool: pose(&frames.tool), work: pose(&frames.work) }
+impl hexad_frames {
+    fn frames(&self) -> Frames {
+        Frames { tool: pose(&self.tool), work: pose(&self.work) }
+    }
 }
 
 /// Motion of the tool in the work frame while the platform moves so in the base frame. The angles are those nearest to zero.
 ///
 /// # Safety
 ///
-/// `named` is NULL or frames, `platform` is NULL or a motion, `tool` is NULL or room for one; both may be the same.
+/// `frames` is NULL or frames, `platform` is NULL or a motion, `tool` is NULL or room for one; both may be the same.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hexad_tool_motion(
-    named: *const hexad_frames,
+    frames: *const hexad_frames,
     platform: *const hexad_motion,
     tool: *mut hexad_motion,
 ) -> hexad_result {
     guard(|| {
         // SAFETY: the caller's promise.
-        let (named, platform) = unsafe { (read(named, "named")?, read(platform, "platform")?) };
-        let found = hexad_motion::of(&frames(&named).tool_motion(&platform.motion()));
+        let (frames, platform) = unsafe { (read(frames, "frames")?, read(platform, "platform")?) };
+        let found = hexad_motion::of(&frames.frames().tool_motion(&platform.motion()));
         // SAFETY: the caller's promise.
         unsafe { write(tool, found, "tool") }.map(|()| HEXAD_OK)
     })
@@ -83,17 +85,17 @@ pub unsafe extern "C" fn hexad_tool_motion(
 ///
 /// # Safety
 ///
-/// `named` is NULL or frames, `tool` is NULL or a motion, `platform` is NULL or room for one; both may be the same.
+/// `frames` is NULL or frames, `tool` is NULL or a motion, `platform` is NULL or room for one; both may be the same.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hexad_platform_motion(
-    named: *const hexad_frames,
+    frames: *const hexad_frames,
     tool: *const hexad_motion,
     platform: *mut hexad_motion,
 ) -> hexad_result {
     guard(|| {
         // SAFETY: the caller's promise.
-        let (named, tool) = unsafe { (read(named, "named")?, read(tool, "tool")?) };
-        let found = hexad_motion::of(&frames(&named).platform_motion(&tool.motion()));
+        let (frames, tool) = unsafe { (read(frames, "frames")?, read(tool, "tool")?) };
+        let found = hexad_motion::of(&frames.frames().platform_motion(&tool.motion()));
         // SAFETY: the caller's promise.
         unsafe { write(platform, found, "platform") }.map(|()| HEXAD_OK)
     })
