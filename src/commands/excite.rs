@@ -38,7 +38,7 @@ pub struct ExciteArguments {
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
     periods: u32,
     /// Amplitude as a share of the largest that drives and limits allow, as for an unknown payload 0.05
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = amplitude)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.7, value_parser = amplitude)]
     amplitude: f64,
     /// Seed of the random motions from which the design begins
     #[arg(long, default_value_t = 0)]

@@ -21,6 +21,8 @@ use super::common::largest;
 
 const SETTLING_S: f64 = 1.0;
 const PERIODS: u32 = 6;
+/// The default of `hexad excite`.
+const AMPLITUDE: f64 = 0.7;
 /// Known weight as a share of the platform, and its place; then the payload's \[kg\], \[m\].
 const WEIGHT_RATIO: f64 = 0.15;
 const WEIGHT_AT: [f64; 3] = [0.3, -0.2, 0.8];
@@ -103,7 +105,7 @@ fn certificate_machines_are_identified() {
     let config = configured("motion_base", "[limits]\npayload_change_kg = inf\n");
     let file = &config.machine;
     let excitation =
-        Trajectory::Excitation(Box::new(Trajectory::excitation(&config, PERIODS, 1.0, 1).unwrap()));
+        Trajectory::Excitation(Box::new(Trajectory::excitation(&config, PERIODS, AMPLITUDE, 1).unwrap()));
     let circle = Trajectory::built_in(&config, BuiltInMotion::Circle, 10.0).unwrap();
     let weight = (WEIGHT_RATIO * file.platform.mass, WEIGHT_AT);
     let certificate = Certificate::new("identification", 1, 200);
