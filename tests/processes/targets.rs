@@ -152,7 +152,7 @@ fn a_dry_run_needs_no_daemon() {
     );
     assert_eq!(status.code(), Some(0), "{stderr}");
     for words in
-        ["from is home, as no daemon answers", "1150.000", "-5.000", "-0.003", "5.730", "limited by velocity"]
+        ["from is home, as no daemon answers", "1150.000", "-5.000", "-0.003", "5.7296", "limited by velocity"]
     {
         assert!(stdout.contains(words), "{words}: {stdout}");
     }
