@@ -151,9 +151,14 @@ fn a_dry_run_needs_no_daemon() {
         &["--relative", "--x", "50mm", "--y=-5mm", "--z", "-3um", "--gamma", "100mrad", "--dry-run"],
     );
     assert_eq!(status.code(), Some(0), "{stderr}");
-    for words in
-        ["from is home, as no daemon answers", "1150.000", "-5.000", "-0.003", "5.730", "limited by velocity"]
-    {
+    for words in [
+        "from is home, as no daemon answers",
+        "1150.000",
+        "-5.000",
+        "-0.003",
+        "5.7296",
+        "limited by velocity",
+    ] {
         assert!(stdout.contains(words), "{words}: {stdout}");
     }
     let duration = stdout.lines().find_map(|line| line.strip_prefix("duration  ")).expect("a duration");
