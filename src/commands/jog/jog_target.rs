@@ -217,8 +217,10 @@ mod tests {
         ];
         for (text, step) in files {
             let config = Config::parse(text, "a test").unwrap();
-            let (constants, home) = (constants(&config), config.machine.home);
-            let mut target = JogTarget::new(&constants, MotionDigits::new(config.resolution()), home);
+            let (constants, coordinates) = (constants(&config), Coordinates::default());
+            let home = config.machine.home;
+            let mut target =
+                JogTarget::new(&constants, &coordinates, MotionDigits::new(config.resolution()), home);
             for key in [Key::Mode, Key::Slower, Key::Slower, Key::Slower, UP] {
                 assert_eq!(target.press(key, &pose_of(&home)), None);
             }
