@@ -53,7 +53,7 @@ fn a_tool_turns_about_its_origin_and_becomes_a_frame_of_a_new_file() {
     let (tool, both) = (["--tool", "tip"], ["--tool", "tip", "--work", "table"]);
     refused(
         &["goto"],
-        &["--tool", "tap", "--x", "1", "--dry-run"],
+        &["--tool", "tap", "--x", "1m", "--dry-run"],
         2,
         &["no tool frame \"tap\", must be one of: tip;"],
     );
