@@ -1,4 +1,4 @@
-//! Frames of a command: the coordinates that it reads and shows are those of a tool in a work frame.
+//! Frames of a command: it reads and shows coordinates of a tool in a work frame.
 
 use clap::Args;
 
@@ -13,7 +13,7 @@ use crate::operator::status_report::StatusReport;
 
 #[derive(Clone, Debug, Default, Args)]
 pub struct FrameOptions {
-    /// Coordinates are those of this tool frame of the machine file, and rotations are about its origin; without it, the platform
+    /// Coordinates describe this tool frame of the machine file, and rotations are about its origin; without it, the platform
     #[arg(long, value_name = "NAME")]
     pub tool: Option<String>,
     /// Coordinates are in this work frame of the machine file; without it, in the base frame
@@ -54,7 +54,7 @@ pub struct Coordinates {
 }
 
 impl Coordinates {
-    /// Whether X is that of the platform in the base frame.
+    /// Whether X describes the platform in the base frame.
     pub fn is_empty(&self) -> bool {
         self.frames.is_none()
     }

@@ -57,7 +57,7 @@ impl UnsolvedRows {
 const MIN_STEP_S: f64 = 1e-6;
 
 /// Reads a table of t, X, X', X'', with orientations in a format. If X' and X'' are missing, they are computed from the spline
-/// through the poses. Each row has the triple of Bryan angles nearest to that of the row before, the first nearest to `home`.
+/// through the poses. Each row has the triple of Bryan angles nearest to the row before, the first row nearest to `home`.
 pub fn read_trajectory(
     path: &Path,
     format: OrientationFormat,

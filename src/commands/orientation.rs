@@ -14,7 +14,7 @@ pub const ROTATION_HELP: &str = "Orientations in the table: an order of the rota
 /// Name of the format with quaternions.
 const QUATERNION: &str = "quaternion";
 
-/// Largest deviation of a quaternion's norm from 1: that of rounding to three digits, many times.
+/// Largest deviation of a quaternion's norm from 1: many times the rounding error of three digits.
 const MAX_NORM_DEVIATION: f64 = 0.01;
 
 /// Format of the orientations of a table.
@@ -90,7 +90,7 @@ impl OrientationFormat {
         }
     }
 
-    /// Numbers of a pose in this format; of those that are equivalent, the nearest to those of the row before.
+    /// Numbers of a pose in this format; of equivalent ones, the nearest to the row before.
     pub fn numbers(self, pose: &Pose, near: &[f64]) -> Vec<f64> {
         match self {
             Self::Angles(order) => order.coordinates(pose, &six(near, 0)).into(),

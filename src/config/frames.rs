@@ -97,7 +97,7 @@ pub(super) fn read(root: &mut SectionReader) -> Vec<NamedFrame> {
     for mut reader in root.optional_rows("frame") {
         let name = reader.name("name", MAX_FRAME_NAME_LENGTH);
         if let Some(earlier) = frames.iter().position(|frame| frame.name == name && !name.is_empty()) {
-            reader.reject("name", format!("must differ from that of frame[{}]", earlier + 1));
+            reader.reject("name", format!("must differ from the name of frame[{}]", earlier + 1));
         }
         let options = [FrameKind::Tool, FrameKind::Work].map(|kind| (kind.name(), kind));
         let kind = reader.choice("kind", &options).unwrap_or(FrameKind::Tool);

@@ -13,14 +13,14 @@
 //! | acceleration | `p'' = R_w^T (v' + omega' x r + omega x (omega x r))` | `v' = R_w p'' - omega' x r - omega x (omega x r)` |
 //!
 //! `r = R p_t` is the tool's origin from C, in base axes. A rotation of the tool in the work frame is about the tool's
-//! origin. Both directions are exact to rounding. Limits and the envelope are those of the platform in the base frame: they are
+//! origin. Both directions are exact to rounding. Limits and the envelope bound the platform in the base frame: they are
 //! not applied here.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// A tool frame and a work frame: in these, coordinates are those of the tool in the work frame. The default is the
+/// A tool frame and a work frame: coordinates in these frames describe the tool in the work frame. The default is the
 /// platform in the base frame.
 ///
 /// ```

@@ -1,7 +1,7 @@
 //! Orientations as other programs write them: angles in any order of the rotations, and quaternions.
 //!
-//! The angles have the names of their axes in every order: alpha about x, beta about y, gamma about z. The name of an order is
-//! that of the product: `zyx` is `R = Rz(gamma) Ry(beta) Rx(alpha)`, and `xyz` is that of X.
+//! The angles have the names of their axes in every order: alpha about x, beta about y, gamma about z. An order is named
+//! after the product: `zyx` is `R = Rz(gamma) Ry(beta) Rx(alpha)`. X has the order `xyz`.
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3, Vector6};
 
@@ -21,7 +21,7 @@ use crate::model::task::{TaskState, task_coordinates};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RotationOrder {
-    /// `Rx(alpha) Ry(beta) Rz(gamma)`, that of X
+    /// `Rx(alpha) Ry(beta) Rz(gamma)`, the order of X
     #[default]
     Xyz,
     /// `Rx(alpha) Rz(gamma) Ry(beta)`
@@ -52,7 +52,7 @@ impl RotationOrder {
         }
     }
 
-    /// Motion of numbers like those of a [`TaskState`], with angles and their derivatives in this order.
+    /// Motion of a state like a [`TaskState`], with angles and their derivatives in this order.
     ///
     /// P takes the first axis of rotation to x, the second to y, the third to z: `P R P^T` has the order of X. If P is a
     /// reflection, it turns every angle and every angular velocity around.

@@ -111,7 +111,7 @@ fn turn(config: &Config, motion: &ToolMotion, vertex: impl Fn(&Pose) -> Vector3<
     Turn { shift: after.mean() - mean, mean_squares, farthest }
 }
 
-/// Of one seed, a mean over a second has 5 nm of the noise; so the figures are those of several. Where Coulomb friction of the file
+/// Of one seed, a mean over a second has 5 nm of the noise; so the figures are means of several seeds. Where Coulomb friction of the file
 /// holds the legs at rest, it quietens the vertex there: at the full speed, in 0.34 s, the RMS in motion is then 1.9 times that at rest.
 #[test]
 fn a_mirror_turns_about_its_vertex() {

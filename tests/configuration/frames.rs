@@ -55,7 +55,7 @@ fn every_mistake_is_named_at_once() {
             "frame[4].x = 1: unknown key, must be one of: name, kind, pose",
             "frame[5].kind: missing, must be one of \"tool\", \"work\"",
             "frame[5].pose: missing, must be an array of 6 numbers",
-            "frame[5].name = 'vertex': must differ from that of frame[1]",
+            "frame[5].name = 'vertex': must differ from the name of frame[1]",
         ]
     );
     assert_eq!(messages(&format!("frame = 3\n{FRIED}")), ["frame = 3: must be sections headed [[frame]]"]);

@@ -234,7 +234,7 @@ fn a_first_motion_leads_to_an_identified_file() {
         fs::rename(machine.path("NEW.toml"), &machine.file).unwrap();
         session(&machine, &platform, "hexad run --config F --record identified", &motions);
 
-        // The file is that of the recordings that are identified, not of the other motion.
+        // The machine file comes from the identified recordings, not from the other motion.
         let line = "hexad identify empty/*.mcap --validate identified/*.mcap --json";
         let ended = Hexad::spawn(&machine, "identify", typed(&machine, line)).ends_within(HANG);
         let json: Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);

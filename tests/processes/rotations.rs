@@ -121,7 +121,7 @@ fn motions() -> String {
     format!("{POSES},{},{}", of("_rate"), of("_accel"))
 }
 
-/// The inverse dynamics of a table in any order are those of the same motion in X, with derivatives of the table and with
+/// A table in any order gives the same forces as the same motion in X, with derivatives of the table and with
 /// computed ones; forward kinematics return the numbers of the table.
 #[test]
 fn tables_of_every_order_are_the_same_motion() {

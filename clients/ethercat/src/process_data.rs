@@ -19,7 +19,7 @@ const WORKING_COUNTER: u16 = 3 * LEGS as u16;
 pub enum Exchange {
     /// All six drives have taken part, in OP.
     Complete,
-    /// The same, but the frame came so soon after SYNC0 that the inputs may be those of the SYNC0 before.
+    /// The same, but the frame came so soon after SYNC0 that the inputs may have been latched at the SYNC0 before.
     Early,
     /// A device is missing or not in OP.
     Incomplete,

@@ -58,8 +58,8 @@ pub struct Identification {
     pub residual: [f64; LEGS],
     /// Correlation of successive residuals of each leg: 0 for white noise.
     pub correlation: [f64; LEGS],
-    /// Base parameters by least squares of the equations alone, without prior: pairs of an index and a value. Indices are those of
-    /// the [regressor](crate::model::regressor), then six force scales, six products of force scale and load friction, and the
+    /// Base parameters by least squares of the equations alone, without prior: pairs of an index and a value. Indices count
+    /// the parameters of the [regressor](crate::model::regressor), then six force scales, six products of force scale and load friction, and the
     /// parameters of the payload. `None` without a known weight, or if the equations do not determine them.
     pub base_parameters: Option<Vec<(usize, f64)>>,
     parameters: Parameters,
@@ -170,7 +170,7 @@ pub struct Prediction {
     pub time_s: f64,
     /// Recorded command \[N\].
     pub command: f64,
-    /// Command less that of the machine \[N\].
+    /// Recorded command less the machine's \[N\].
     pub residual: f64,
 }
 

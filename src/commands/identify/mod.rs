@@ -84,7 +84,7 @@ impl CommandError for IdentifyError {
 impl IdentifyArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let mut recorded = Recorded::default();
-        // The file is that of the last recording, which must not be one that only validates.
+        // The machine file comes from the last recording, so recordings that only validate are read first.
         let [other, empty, loaded, payload] =
             [&self.validate, &self.recordings, &self.loaded, &self.payload].map(|paths| recorded.read(paths));
         let (other, empty, loaded, payload) = (other?, empty?, loaded?, payload?);

@@ -68,7 +68,7 @@ pub(super) struct IdentificationReport {
     delay: Delay,
 }
 
-/// Runs whose forces are predicted: those of the other motion, or the identified ones. The payload is not a part of the machine.
+/// Runs whose forces are predicted: runs of the other motion, or the identified runs. The payload is not a part of the machine.
 pub(super) fn predicted(runs: &[Run], validation: &[Run]) -> Vec<Run> {
     let predicted = if validation.is_empty() { runs } else { validation };
     predicted.iter().filter(|run| run.load != Load::Payload).cloned().collect()

@@ -55,7 +55,8 @@ pub struct MoveArguments {
     machine: MachineFile,
     #[command(flatten)]
     source: TrajectorySource,
-    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "pause", "resume"])]
+    #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz")]
+    #[arg(value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "pause", "resume"])]
     rotation: OrientationFormat,
     #[command(flatten)]
     frames: FrameOptions,

@@ -39,7 +39,7 @@ pub struct StatusArguments {
     watch: bool,
     #[command(flatten)]
     frames: FrameOptions,
-    /// Print the daemon's answer as JSON, one line for each; its coordinates are those of the platform in the base frame
+    /// Print the daemon's answer as JSON, one line for each; its coordinates describe the platform in the base frame
     #[arg(long, conflicts_with_all = ["tool", "work"])]
     json: bool,
 }

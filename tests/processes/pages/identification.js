@@ -1,15 +1,6 @@
 // What the page of an identification shows, and the RMS of the residuals that its charts draw.
 setTimeout(() => {
   const rows = (id) => [...document.querySelectorAll(`#${id} tr`)].map((row) => [...row.cells].map((cell) => cell.textContent));
-  const isDrawn = ({ chart }) => {
-    const { left, top, width, height } = chart.bbox;
-    const pixels = chart.ctx.getImageData(left, top, width, height).data;
-    for (let k = 0; k < pixels.length; k += 4) {
-      const rgb = pixels.slice(k, k + 3);
-      if (pixels[k + 3] > 200 && Math.max(...rgb) - Math.min(...rgb) > 60) return true;
-    }
-    return false;
-  };
   const rms = (name) => LEGS.map((_, leg) => {
     const drawn = levels.flatMap((level) => [...level.columns[HEAD.columns[name] + leg]]).filter(Number.isFinite);
     return Math.sqrt(drawn.reduce((sum, number) => sum + number * number, 0) / drawn.length);
@@ -25,6 +16,7 @@ setTimeout(() => {
   });
   document.body.dataset.result = JSON.stringify({
     error: document.body.dataset.error || null, drawn: charts.map(isDrawn), rms: [rms("residual_before"), rms("residual_after")],
-    difference: Math.max(...differences.filter(Number.isFinite)), parameters: rows("parameters"), hollow: document.querySelectorAll("#parameters .hollow").length, residuals: rows("residuals"), marks,
+    difference: Math.max(...differences.filter(Number.isFinite)), parameters: rows("parameters"), residuals: rows("residuals"),
+    hollow: document.querySelectorAll("#parameters .hollow").length, marks,
   });
 }, 300);

@@ -32,7 +32,7 @@ const CYCLES: u64 = 12_000;
 const SWAY: [(f64, f64); 6] =
     [(1e-6, 157.0), (0.03, 1.3), (-0.03, 1.6), (0.04, 1.9), (0.03, 2.2), (-0.04, 2.5)];
 
-/// Writes a recording of a motion. The forces are those of a machine that is not what its file says.
+/// Writes a recording of a motion. The forces act on a machine that is not what its file says.
 fn write(machine: &Machine, motion: &mut dyn FnMut(f64) -> Motion) -> PathBuf {
     let config = Config::load(&machine.file).unwrap();
     let truth = drawn(&config.machine, &mut Random::new(7));
@@ -68,7 +68,9 @@ fn identified(machine: &Machine, recording: &Path, page: &Path) -> (String, Valu
     assert_eq!(text.status.code(), Some(0), "{}", text.stderr);
     assert!(text.stdout.contains(&format!("page with charts: {}", page.display())), "{}", text.stdout);
     let json = run(machine, &["identify", recording, "--json"]);
-    let shown = Browser::find().map(|browser| browser.run(page, include_str!("identification.js")));
+    let shown = Browser::find().map(|browser| {
+        browser.run(page, concat!(include_str!("is_drawn.js"), include_str!("identification.js")))
+    });
     (text.stdout, serde_json::from_str(&json.stdout).unwrap(), shown)
 }
 

@@ -39,7 +39,7 @@ const PEAK_N: f64 = 900.0;
 const MISSING: std::ops::Range<u64> = CYCLES - 500..CYCLES - 490;
 
 /// Uses the page as a person does.
-const SCRIPT: &str = include_str!("drive.js");
+const SCRIPT: &str = concat!(include_str!("is_drawn.js"), include_str!("drive.js"));
 
 /// A configuration with slow cycles.
 fn config(machine: &Machine) -> Config {

@@ -72,7 +72,7 @@ impl Segment {
         Self { devices, mechanics, reachable: LEGS, leg_of_device, now_ns }
     }
 
-    /// Instant until which the mechanics have been simulated: that of the last SYNC0 \[ns\].
+    /// Last SYNC0, until which the mechanics have been simulated \[ns\].
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
