@@ -26,8 +26,6 @@ const MAX_DAMPING: f64 = 1e12;
 const FIRST_RESIDUAL_RATIO: f64 = 0.01;
 /// Step of the differences, over the deviation of a parameter.
 const DIFFERENCE: f64 = 1e-4;
-/// Part of a step over which the curvature of the terms is measured.
-const BEND: f64 = 0.1;
 /// Deviation of the mean logarithm of the force scales, where no known weight shows it.
 const GAUGE: f64 = 1e-5;
 /// What is squared and added up: equations of all legs, prior, gauge.
@@ -138,12 +136,7 @@ impl Problem<'_> {
         jacobian
     }
 
-    /// Levenberg-Marquardt with geodesic acceleration (Transtrum, Sethna, 2012): a step follows the curvature of the terms to second
-    /// order. Straight steps do not get along the valley of a small payload, whose second moments are products of parameters.
     fn minimise(&self, mut free: Free, sigma: f64) -> Option<Free> {
-        let scaled = |step: &DVector<f64>| {
-            Free::from_iterator(step.iter().copied()).component_mul(&self.parameters.deviation)
-        };
         let mut terms = self.terms(&free, sigma);
         let mut damping = 1e-3;
         for _ in 0..MAX_STEPS {
@@ -155,13 +148,10 @@ impl Problem<'_> {
             while damping < MAX_DAMPING {
                 let mut damped = normal.clone();
                 damped.set_diagonal(&(normal.diagonal() * (1.0 + damping)));
-                let damped = damped.cholesky()?;
-                let velocity = damped.solve(&-&gradient);
-                let ahead = self.terms(&(free + scaled(&(&velocity * BEND))), sigma);
-                let bend = ((ahead - &terms) / BEND - &jacobian * &velocity) * (2.0 / BEND);
-                let acceleration = damped.solve(&-jacobian.tr_mul(&bend));
-                let share = if acceleration.norm() < velocity.norm() { 0.5 } else { 0.0 };
-                let next = self.parameters.within_bounds(free + scaled(&(velocity + acceleration * share)));
+                let step = damped.cholesky()?.solve(&gradient);
+                let step =
+                    Free::from_iterator(step.iter().copied()).component_mul(&self.parameters.deviation);
+                let next = self.parameters.within_bounds(free - step);
                 let next_terms = self.terms(&next, sigma);
                 change = before - next_terms.norm_squared();
                 if change >= 0.0 {
