@@ -9,6 +9,7 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::thread;
 use std::time::Duration;
 
 use clap::Args;
@@ -48,6 +49,9 @@ mod playback;
 pub(super) mod precheck;
 pub(super) mod rate_change;
 pub mod trajectory;
+
+/// Time between two questions whether a source may join in lock-step.
+const JOIN_INTERVAL: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Args)]
 pub struct MoveArguments {
@@ -201,7 +205,6 @@ fn run(
     stop: &Stop,
 ) -> Result<(), MoveError> {
     let bus = config.join()?;
-    let setpoints = bus.publisher()?;
     let engagement = match engage_within {
         None => Engagement::None,
         Some(_) if bus.is_simulated() => Engagement::in_step(&bus)?,
@@ -209,11 +212,14 @@ fn run(
     };
     info!(name = %config.name, seconds = trajectory.duration(), "setpoint source");
     // Every status is needed, because a state may last one cycle.
-    let playback = Playback::new(config, trajectory, is_to_hold, bus.subscriber(usize::MAX)?, engagement);
+    let mut playback = Playback::new(config, trajectory, is_to_hold, bus.subscriber(usize::MAX)?, engagement);
     if bus.is_simulated() {
-        run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?;
+        while !stop.is_requested() && !playback.may_join() {
+            thread::sleep(JOIN_INTERVAL);
+        }
+        run_in_lockstep(config, bus.subscriber(8)?, playback, bus.publisher()?, stop)?;
     } else {
-        run_in_real_time(config, playback, setpoints, stop)?;
+        run_in_real_time(config, playback, bus.publisher()?, stop)?;
     }
     if stop.is_requested() { Err(MoveError::Interrupted) } else { Ok(()) }
 }

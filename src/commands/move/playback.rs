@@ -100,6 +100,21 @@ impl<'a> Playback<'a> {
         }
     }
 
+    /// Whether the source may join. In lock-step the daemon follows a source from its first message on, so that a platform that is
+    /// held can be taken over only before it.
+    pub fn may_join(&mut self) -> bool {
+        match held_x(self.config) {
+            Ok(held) => {
+                self.phase = held.map_or(Phase::Waiting, |x| Phase::Standing(self.timeline(&x.into())));
+                true
+            }
+            Err(reason) => {
+                self.log_reason(&format!("waiting: {reason}"));
+                false
+            }
+        }
+    }
+
     /// Reads all new statuses. An error if control has ended.
     pub fn receive(&mut self, now_ns: u64) -> Result<(), MoveError> {
         while let Some(status) = self.statuses.receive() {
@@ -308,10 +323,11 @@ impl<'a> Playback<'a> {
                 }
                 self.next_inquiry_ns = now_ns + INQUIRY_INTERVAL_NS;
                 match held_x(self.config) {
-                    Ok(x) => {
+                    Ok(Some(x)) => {
                         self.phase = Phase::Standing(self.timeline(&x.into()));
                         return Ok(());
                     }
+                    Ok(None) => "the daemon does not answer".into(),
                     Err(reason) => reason,
                 }
             }

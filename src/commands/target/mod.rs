@@ -75,14 +75,14 @@ pub fn target_x(constants: &Constants, answer: &Answer) -> Option<[f64; 6]> {
     check_target(constants, &pose_of(&target)).is_ok().then_some(target)
 }
 
-/// X at which the platform stands under control, held after its source has ended. Otherwise the reason why another
-/// source cannot take over.
-pub fn held_x(config: &Config) -> Result<[f64; 6], String> {
-    let answer = status(&config.name).map_err(|error| error.to_string())?;
+/// X at which the platform stands under control, held after its source has ended; `None` if no daemon is in control.
+/// An error with the reason if another source cannot take over.
+pub fn held_x(config: &Config) -> Result<Option<[f64; 6]>, String> {
+    let Some(answer) = status(&config.name).ok().filter(has_control) else { return Ok(None) };
     if let Some(other) = answer.status.as_deref().and_then(other_source) {
         return Err(TargetError::OtherSource(named(other)).to_string());
     }
-    let reference = reference_x(config, &answer).filter(|_| has_control(&answer));
+    let reference = reference_x(config, &answer);
     // Without setpoints, `on_violation = "limit"` holds the reference.
     let is_holding = answer.diagnostic.code == DiagnosticCode::HoldingPose as u32;
     let target = answer.status.as_ref().and_then(|report| report.target);
@@ -93,7 +93,7 @@ pub fn held_x(config: &Config) -> Result<[f64; 6], String> {
     };
     let [mm, mrad] = distance(&reference, &held).map(|distance| 1e3 * distance);
     if is_reached(&reference, &held) {
-        return Ok(held);
+        return Ok(Some(held));
     }
     Err(format!("the platform is still {mm:.3} mm and {mrad:.3} mrad from the target that it moves to"))
 }
