@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
-use std::{env, thread};
+use std::{env, fs, thread};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
@@ -193,6 +193,28 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let ended = daemon.stops_on("TERM", HANG);
     assert!(!ended.stderr.contains("did not come to rest"), "{}", ended.stderr);
     player_ended(source);
+    plant.stops_on("TERM", HANG);
+}
+
+/// From its first message on the daemon follows a source: it must not be home.
+#[test]
+fn in_lock_step_a_source_begins_where_the_platform_is_held() {
+    let _turn = turns::beside_others();
+    let machine = Machine::with("lock-step-held", LOCKSTEP);
+    let daemon = Hexad::start::<&str>(&machine, "run", &[]);
+    let plant = Hexad::start::<&str>(&machine, "plant", &[]);
+    for (from, to, option) in [(0.0, 0.02, "--engage"), (0.02, 0.0, "--hold"), (0.0, 0.01, "--hold")] {
+        let file = machine.path("way.csv");
+        let x = |way: f64| format!("{},0,0", 1.1 + from + 0.1 * way * (to - from));
+        let rows: String = (0..=10).map(|k| format!("{},0,0,0,{}\n", k, x(f64::from(k)))).collect();
+        fs::write(&file, format!("t,alpha,beta,gamma,x,y,z\n{rows}")).unwrap();
+        let options = ["--trajectory", file.to_str().unwrap(), "--hold", option];
+        let options = &options[..if option == "--hold" { 3 } else { 4 }];
+        let ended = Hexad::start(&machine, "move", options).ends_within(HANG);
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    }
+    let said = daemon.stops_on("TERM", HANG).stderr;
+    assert_eq!(said.matches("active:").count(), 1, "{said}");
     plant.stops_on("TERM", HANG);
 }
 

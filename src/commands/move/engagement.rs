@@ -18,8 +18,13 @@ pub enum Engagement {
     None,
     /// Request over the control socket, sent by a separate thread.
     Socket { config: Box<Config>, began: Instant, within: Duration, stop: Stop, result: Option<Outcome> },
-    /// Request in step with the setpoints, in simulated time; `sent` is the last one.
-    InStep { commands: Publisher<CommandMessage>, sent: Option<MessageId> },
+    /// Request in step with the setpoints, in simulated time, which begins with the first wait; `sent` is the last one.
+    InStep {
+        commands: Publisher<CommandMessage>,
+        began_ns: Option<u64>,
+        within: Duration,
+        sent: Option<MessageId>,
+    },
 }
 
 type Outcome = Receiver<Result<(), OperatorError>>;
@@ -32,18 +37,32 @@ impl Engagement {
     }
 
     /// Request in step with the setpoints.
-    pub fn in_step(bus: &Bus) -> Result<Self, PortError> {
-        Ok(Self::InStep { commands: bus.publisher()?, sent: None })
+    pub fn in_step(bus: &Bus, within: Duration) -> Result<Self, PortError> {
+        Ok(Self::InStep { commands: bus.publisher()?, began_ns: None, within, sent: None })
     }
 
-    /// Error if the time has passed before the request could be sent. `reason` says why it could not.
-    pub fn check_time(&self, reason: &str) -> Result<(), MoveError> {
-        match self {
-            Self::Socket { began, within, result: None, .. } if began.elapsed() > *within => {
-                Err(MoveError::NotEngaged(within.as_secs_f64(), reason.into()))
-            }
-            _ => Ok(()),
+    /// Control has begun; if it ends, the time in step with the setpoints begins again.
+    pub fn has_succeeded(&mut self) {
+        if let Self::InStep { began_ns, .. } = self {
+            *began_ns = None;
         }
+    }
+
+    /// Error if the time has passed before the request could be sent, or in step with the setpoints before control began.
+    /// `reason` says why.
+    pub fn check_time(&mut self, now_ns: u64, reason: &str) -> Result<(), MoveError> {
+        let (elapsed, within) = match self {
+            Self::Socket { began, within, result: None, .. } => (began.elapsed(), *within),
+            Self::InStep { began_ns, within, .. } => {
+                let began_ns = *began_ns.get_or_insert(now_ns);
+                (Duration::from_nanos(now_ns.saturating_sub(began_ns)), *within)
+            }
+            Self::None | Self::Socket { .. } => return Ok(()),
+        };
+        if elapsed <= within {
+            return Ok(());
+        }
+        Err(MoveError::NotEngaged(within.as_secs_f64(), reason.into()))
     }
 
     /// Sends the request while the setpoints hold the pose of the platform. An error if it was refused.
@@ -61,7 +80,7 @@ impl Engagement {
                     Err(TryRecvError::Empty | TryRecvError::Disconnected) => Ok(()),
                 }
             }
-            Self::InStep { commands, sent } => {
+            Self::InStep { commands, sent, .. } => {
                 let refusal = status.request_diagnostic.diagnostic().unwrap_or_default();
                 let is_answer = *sent
                     == Some(MessageId { epoch: status.request_epoch, sequence: status.request_sequence });

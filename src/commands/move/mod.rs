@@ -207,7 +207,7 @@ fn run(
     let bus = config.join()?;
     let engagement = match engage_within {
         None => Engagement::None,
-        Some(_) if bus.is_simulated() => Engagement::in_step(&bus)?,
+        Some(within) if bus.is_simulated() => Engagement::in_step(&bus, within)?,
         Some(within) => Engagement::over_socket(config, within, stop),
     };
     info!(name = %config.name, seconds = trajectory.duration(), "setpoint source");

@@ -202,6 +202,7 @@ impl<'a> Playback<'a> {
     fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), MoveError> {
         if let (Phase::Standing(timeline), State::Active) = (&self.phase, state) {
             info!("the daemon is in control: moving");
+            self.engagement.has_succeeded();
             let path = Path::new(*timeline);
             (self.phase, self.last_active_ns) = (Phase::Playing(path, now_ns), now_ns);
             return Ok(());
@@ -268,9 +269,10 @@ impl<'a> Playback<'a> {
                 if let Some(status) = &self.status {
                     self.engagement.request(now_ns, status)?;
                 }
-                self.log_reason(
-                    "the setpoints hold the pose of the platform: waiting for control (hexad engage)",
-                );
+                let reason =
+                    "the setpoints hold the pose of the platform: waiting for control (hexad engage)";
+                self.engagement.check_time(now_ns, reason)?;
+                self.log_reason(reason);
                 motion(task)
             }
             Phase::Playing(path, since_ns) => {
@@ -336,7 +338,7 @@ impl<'a> Playback<'a> {
                 format!("the pose of the platform is unknown: {diagnostic}")
             }
         };
-        self.engagement.check_time(&reason)?;
+        self.engagement.check_time(now_ns, &reason)?;
         self.log_reason(&format!("waiting: {reason}"));
         Ok(())
     }

@@ -139,7 +139,12 @@ impl Hexad {
             if let Some(status) = self.child.try_wait().expect("the state of a process") {
                 break status;
             }
-            assert!(start.elapsed() < limit, "{} does not end within {limit:?}", self.command);
+            let command = &self.command;
+            assert!(
+                start.elapsed() < limit,
+                "{command} must end within {limit:?}, and said:\n{}",
+                self.words()
+            );
             sleep(LOOK);
         };
         let stdout = fs::read_to_string(&self.stdout).expect("standard output");
