@@ -58,8 +58,9 @@ fn a_spun_release_is_on_time_and_the_spin_is_bounded() {
         let on_time = spun.wakeup * 4 < slept.wakeup;
         // What is saved at the wake-up arrives at the subscriber, and nothing is lost on the way.
         let passed_on = spun.visible + saved / 2 < slept.visible;
-        // 3 us for the cycle, the way through two threads and the bus, beside the wake-up that others pay.
-        let in_time = spun.visible <= slept.wakeup + 3000;
+        // 3 us for the way through two threads and the bus, beside the cycle, which is slower on a busy processor, and the wake-up that
+        // others pay.
+        let in_time = spun.visible <= slept.wakeup + spun.compute + 3000;
         let busy = spun.compute as f64 / PERIOD_NS as f64;
         let bounded = spun.share < slept.share + max_lead_share + busy && spun.share > slept.share;
         let unthrottled = spun.share + spun.io_share < 0.95;
