@@ -56,4 +56,5 @@ mod tables;
 mod targets;
 mod trajectory;
 mod two_sources;
+mod udp;
 mod wrong_senders;

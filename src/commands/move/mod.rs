@@ -8,6 +8,7 @@
 //! send requests to the running player.
 
 use std::io;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
@@ -19,6 +20,7 @@ use self::engagement::Engagement;
 use self::playback::{Playback, PlaybackStep};
 use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
+use self::udp::StreamOptions;
 use super::arguments::{MachineFile, duration};
 use super::coordinates::FrameOptions;
 use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
@@ -49,6 +51,7 @@ mod playback;
 pub(super) mod precheck;
 pub(super) mod rate_change;
 pub mod trajectory;
+mod udp;
 
 /// Time between two questions whether a source may join in lock-step.
 const JOIN_INTERVAL: Duration = Duration::from_millis(20);
@@ -60,15 +63,17 @@ pub struct MoveArguments {
     #[command(flatten)]
     source: TrajectorySource,
     #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz")]
-    #[arg(value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "pause", "resume"])]
+    #[arg(value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "udp", "pause", "resume"])]
     rotation: OrientationFormat,
     #[command(flatten)]
     frames: FrameOptions,
     /// Length of the motion [s]
-    #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
+    #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with_all = ["trajectory", "udp"])]
     seconds: f64,
     #[command(flatten)]
     playback: PlaybackOptions,
+    #[command(flatten)]
+    stream: StreamOptions,
 }
 
 /// Options of commands that play a trajectory.
@@ -88,8 +93,11 @@ pub struct PlaybackOptions {
 impl PlaybackOptions {
     /// Plays the trajectory once.
     pub fn play(&self, config: &Config, trajectory: &Trajectory) -> Result<(), Failure> {
-        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
-        Ok(run(config, trajectory, self.hold, within, &Stop::on_signals()?)?)
+        Ok(run(config, trajectory, self.hold, self.engage_within(), &Stop::on_signals()?)?)
+    }
+
+    fn engage_within(&self) -> Option<Duration> {
+        self.engage.then(|| Duration::from_secs_f64(self.within))
     }
 }
 
@@ -106,6 +114,9 @@ struct TrajectorySource {
     /// semicolons, tabs or bars separate fields; without commas a number may have a decimal comma.
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
+    /// Poses that a simulator or a game sends to this address, see docs/motion_simulator.md
+    #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "hold")]
+    udp: Option<SocketAddr>,
     /// Let the player that runs slow down along its path, to rest under control
     #[arg(long, conflicts_with = "hold")]
     pause: bool,
@@ -119,6 +130,10 @@ impl MoveArguments {
         let config = self.machine.load()?;
         if self.source.pause || self.source.resume {
             return Ok(pause::request(&config, self.source.pause)?);
+        }
+        if let Some(address) = self.source.udp {
+            let stop = Stop::on_signals()?;
+            return Ok(udp::follow(&config, address, &self.stream, &self.playback, &stop)?);
         }
         let coordinates = self.frames.coordinates(&config)?;
         let trajectory = match (&self.source.trajectory, self.source.motion) {

@@ -232,10 +232,24 @@ impl<'a> TargetSource<'a> {
         self.send(&Setpoint::motion(self.tick_ns, task))
     }
 
-    fn send(&mut self, setpoint: &Setpoint) -> Result<(), TargetError> {
+    /// The same with a sample of a motion, X of an earlier instant \[ns\], if there is one.
+    pub fn publish_sample(&mut self, sample: Option<(u64, [f64; 6])>) -> Result<(), TargetError> {
+        if let Some((time_ns, x)) = sample {
+            let motion = Setpoint::motion(time_ns, TaskState::at_rest(x));
+            return self.send(&Setpoint { kind: SetpointKind::Pose, ..motion });
+        }
+        self.sleep();
+        self.check()
+    }
+
+    fn sleep(&mut self) {
         sleep_until(self.tick_ns);
-        self.setpoints.publish(self.tick_ns, setpoint.into())?;
         self.tick_ns = self.grid.next_after(self.tick_ns.max(monotonic_ns()));
+    }
+
+    fn send(&mut self, setpoint: &Setpoint) -> Result<(), TargetError> {
+        self.sleep();
+        self.setpoints.publish(setpoint.time_ns, setpoint.into())?;
         let x = setpoint.task.x.into();
         if self.published.is_none_or(|(published, _)| published != x) {
             self.published = Some((x, Instant::now()));

@@ -1,0 +1,296 @@
+//! `hexad move --udp`: poses that a simulator or a game sends as datagrams.
+//!
+//! ```text
+//! boarding pose -> the stream is alive -> blend to it -> follow it -> a pause: stand -> blend to it ...
+//!                                                        Ctrl-C, or a long pause -> boarding pose
+//! ```
+//!
+//! Datagrams are not authenticated: anybody who can send from an allowed address moves the platform, within the limits of the file.
+
+use std::io;
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+
+use clap::Args;
+use tracing::{info, warn};
+
+use self::datagram_format::{Datagram, DatagramFormat, FormatError};
+use self::source_clock::SourceClock;
+use super::PlaybackOptions;
+use crate::analysis::target_motion::check_target;
+use crate::commands::failure::CommandError;
+use crate::commands::quantity::{angle, length, list};
+use crate::commands::target::{TargetError, TargetSource, constants, is_reached, pose_of};
+use crate::config::Config;
+use crate::control::parameters::ViolationPolicy;
+use crate::messages::clock::monotonic_ns;
+use crate::motion::minimum_jerk::{rise, straight_move};
+use crate::realtime::stop_request::Stop;
+
+mod datagram_format;
+mod source_clock;
+
+/// Longest time without datagrams before the platform comes to rest \[s\], if `timeouts.setpoint_ms` does not bound it.
+const PAUSE_S: f64 = 0.25;
+
+/// Share of `timeouts.setpoint_ms` after which a pause begins, so that the daemon never loses its source.
+const PAUSE_SHARE: f64 = 0.8;
+
+/// Datagrams without a pause that make a stream.
+const LIVELY: u32 = 10;
+
+/// Duration of the blend from the pose at which the platform stands to the stream \[s\].
+const BLEND_S: f64 = 3.0;
+
+/// Pause after which the platform moves to the boarding pose \[s\].
+const LONG_PAUSE_S: f64 = 10.0;
+
+/// Most datagrams that are read in one period.
+const DATAGRAMS: usize = 64;
+
+#[derive(Debug, Args)]
+pub struct StreamOptions {
+    /// Format of the datagrams: x-plane, flypt-mover, simtools, or a file, see docs/motion_simulator.md
+    #[arg(long, value_name = "NAME", requires = "udp")]
+    format: Option<String>,
+    /// Address from which datagrams are accepted; required unless --udp is of this host alone
+    #[arg(long, value_name = "IP", requires = "udp")]
+    from: Vec<IpAddr>,
+    /// Pose at which people board, with units, as in 0,0,0,0,0,0.7m; without it, home
+    #[arg(long, value_name = "X", requires = "udp", value_parser = boarding, allow_hyphen_values = true)]
+    boarding: Option<[f64; 6]>,
+}
+
+fn boarding(text: &str) -> Result<[f64; 6], String> {
+    list(text, [angle, angle, angle, length, length, length], "0,0,0,0,0,0.7m")
+}
+
+/// Reasons why no stream is followed.
+#[derive(Debug, thiserror::Error)]
+pub enum StreamError {
+    #[error("--udp: needs --format: x-plane, flypt-mover, simtools, or a file")]
+    NoFormat,
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    #[error("--udp {0}: must be the address of one interface")]
+    AnyInterface(SocketAddr),
+    #[error("--udp {0}: is open to other hosts: name those that may move the platform with --from")]
+    NoSender(SocketAddr),
+    #[error("--udp {0}: {1}")]
+    Socket(SocketAddr, io::Error),
+    #[error("--udp: poses alone need setpoint.on_violation = \"limit\" in the machine file (now \"stop\")")]
+    Policy,
+    #[error(transparent)]
+    Target(#[from] TargetError),
+}
+
+impl CommandError for StreamError {
+    fn has_begun(&self) -> bool {
+        matches!(self, Self::Target(error) if error.has_begun())
+    }
+
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Target(error) => error.exit_code(),
+            _ => 2,
+        }
+    }
+}
+
+/// Follows the datagrams to an address until the first signal; then the platform moves to the boarding pose and stands there.
+pub fn follow(
+    config: &Config,
+    address: SocketAddr,
+    options: &StreamOptions,
+    playback: &PlaybackOptions,
+    stop: &Stop,
+) -> Result<(), StreamError> {
+    if config.deployment.setpoint.on_violation != ViolationPolicy::Limit {
+        return Err(StreamError::Policy);
+    }
+    let mut receiver = Receiver::open(config, address, options)?;
+    let boarding = options.boarding.unwrap_or(config.machine.home);
+    let constants = constants(config);
+    check_target(&constants, &pose_of(&boarding)).map_err(TargetError::from)?;
+    let mut source = TargetSource::open(config, playback.engage_within(), stop)?;
+    info!(%address, "moves to the boarding pose, then waits for datagrams");
+    let mut phase = Phase::Boarding;
+    while !stop.is_repeated() {
+        let newest = receiver.newest();
+        if stop.is_requested() && !matches!(phase, Phase::Leaving) {
+            info!("moves to the boarding pose; once more ends at once");
+            phase = Phase::Leaving;
+        }
+        let now_ns = monotonic_ns();
+        match phase {
+            Phase::Boarding | Phase::Leaving => {
+                source.publish(boarding)?;
+                let is_there = source.active_since().is_some() && is_reached(&source.present_x()?, &boarding);
+                match phase {
+                    Phase::Leaving if is_there => break,
+                    Phase::Boarding if is_there && receiver.is_alive(now_ns) => {
+                        phase = Phase::following(boarding);
+                    }
+                    _ => {}
+                }
+            }
+            Phase::Following { from, since_ns } => {
+                // The last target is newer than datagrams that were late.
+                let sample = newest.filter(|(time_ns, _)| *time_ns > since_ns).map(|(time_ns, x)| {
+                    let blend = rise(seconds(since_ns, now_ns), BLEND_S);
+                    (time_ns, straight_move(&from.into(), &x.into(), &blend).x.into())
+                });
+                source.publish_sample(sample)?;
+                if receiver.silence_s(now_ns) > receiver.pause_s {
+                    let x = source.resting_x(&constants)?;
+                    info!("a pause: the platform stands");
+                    phase = Phase::Pause { x, since_ns: now_ns };
+                }
+            }
+            Phase::Pause { x, since_ns } => {
+                source.publish(x)?;
+                if receiver.is_alive(now_ns) {
+                    phase = Phase::following(x);
+                } else if seconds(since_ns, now_ns) > LONG_PAUSE_S {
+                    info!("a long pause: moves to the boarding pose");
+                    phase = Phase::Boarding;
+                }
+            }
+        }
+    }
+    receiver.log_totals();
+    if stop.is_repeated() { Err(TargetError::Interrupted.into()) } else { Ok(()) }
+}
+
+/// What the platform does.
+#[derive(Clone, Copy)]
+enum Phase {
+    /// Goes to the boarding pose and waits for the stream there.
+    Boarding,
+    /// Follows the stream, at first blended with the pose at which it stood.
+    Following { from: [f64; 6], since_ns: u64 },
+    /// Stands where it came to rest.
+    Pause { x: [f64; 6], since_ns: u64 },
+    /// Goes to the boarding pose for good.
+    Leaving,
+}
+
+impl Phase {
+    fn following(from: [f64; 6]) -> Self {
+        info!("follows the stream, after a blend of {BLEND_S:.0} s");
+        Self::Following { from, since_ns: monotonic_ns() }
+    }
+}
+
+/// Socket with the stream.
+struct Receiver {
+    socket: UdpSocket,
+    format: DatagramFormat,
+    from: Vec<IpAddr>,
+    home: [f64; 6],
+    clock: SourceClock,
+    max_age_ns: i64,
+    pause_s: f64,
+    /// Arrival of the last datagram \[ns\].
+    last_ns: u64,
+    /// Datagrams since the last pause.
+    lively: u32,
+    accepted: u64,
+    /// Rejected: of other senders, not readable, late or repeated.
+    rejected: [u64; 3],
+}
+
+impl Receiver {
+    fn open(config: &Config, address: SocketAddr, options: &StreamOptions) -> Result<Self, StreamError> {
+        let format = DatagramFormat::load(options.format.as_deref().ok_or(StreamError::NoFormat)?)?;
+        if address.ip().is_unspecified() {
+            return Err(StreamError::AnyInterface(address));
+        }
+        if !address.ip().is_loopback() && options.from.is_empty() {
+            return Err(StreamError::NoSender(address));
+        }
+        let socket = UdpSocket::bind(address).and_then(|socket| {
+            socket.set_nonblocking(true)?;
+            Ok(socket)
+        });
+        let timeout_s = config.deployment.timeouts.setpoint_s;
+        Ok(Self {
+            socket: socket.map_err(|error| StreamError::Socket(address, error))?,
+            format,
+            from: options.from.clone(),
+            home: config.machine.home,
+            clock: SourceClock::default(),
+            max_age_ns: (timeout_s * 1e9) as i64,
+            pause_s: PAUSE_S.min(PAUSE_SHARE * timeout_s),
+            last_ns: 0,
+            lively: 0,
+            accepted: 0,
+            rejected: [0; 3],
+        })
+    }
+
+    /// Instant and X of the newest datagram that arrived since the last call.
+    fn newest(&mut self) -> Option<(u64, [f64; 6])> {
+        let mut newest = None;
+        let mut bytes = [0; 2048];
+        for _ in 0..DATAGRAMS {
+            let Ok((size, sender)) = self.socket.recv_from(&mut bytes) else { break };
+            let arrival_ns = monotonic_ns();
+            match self.sample(bytes.get(..size).unwrap_or_default(), sender.ip(), arrival_ns) {
+                Ok(sample) => newest = Some(sample),
+                Err(Rejection(reason)) => {
+                    if self.rejected[reason] == 0 {
+                        warn!(%sender, "a datagram is rejected: {}", REASONS[reason]);
+                    }
+                    self.rejected[reason] += 1;
+                }
+            }
+        }
+        newest
+    }
+
+    fn sample(
+        &mut self,
+        bytes: &[u8],
+        sender: IpAddr,
+        arrival_ns: u64,
+    ) -> Result<(u64, [f64; 6]), Rejection> {
+        if !self.from.is_empty() && !self.from.contains(&sender) {
+            return Err(Rejection(0));
+        }
+        let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
+        let Datagram { stamp_s, x } = datagram.ok_or(Rejection(1))?;
+        let instant =
+            |stamp_s: f64| self.clock.instant_ns((stamp_s * 1e9) as i64, arrival_ns as i64, self.max_age_ns);
+        let time_ns = stamp_s.map_or(Some(arrival_ns as i64), instant).ok_or(Rejection(2))?;
+        let is_pause = self.silence_s(arrival_ns) > self.pause_s;
+        self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
+        (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);
+        Ok((time_ns as u64, x))
+    }
+
+    fn silence_s(&self, now_ns: u64) -> f64 {
+        seconds(self.last_ns, now_ns)
+    }
+
+    fn is_alive(&self, now_ns: u64) -> bool {
+        self.lively >= LIVELY && self.silence_s(now_ns) < self.pause_s
+    }
+
+    fn log_totals(&self) {
+        let [senders, unreadable, late] = self.rejected;
+        info!(accepted = self.accepted, senders, unreadable, late, "datagrams");
+    }
+}
+
+/// A datagram that is not followed, by its place in [`REASONS`].
+struct Rejection(usize);
+
+const REASONS: [&str; 3] = [
+    "its sender is not among --from",
+    "it has not the numbers of --format",
+    "it is late against the stream, or older than the newest",
+];
+
+fn seconds(from_ns: u64, to_ns: u64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}

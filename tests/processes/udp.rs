@@ -1,0 +1,165 @@
+//! `hexad move --udp`: a recorded flight, with lost datagrams, pauses, a jump and strangers.
+
+use std::fs;
+use std::net::UdpSocket;
+use std::time::{Duration, Instant};
+
+use hexad::messages::MeasuredMessage;
+use hexad::messages::clock::monotonic_ns;
+
+use crate::support::children::{HANG, Hexad, run};
+use crate::support::machine::{Machine, PATIENT};
+use crate::support::recorder::Recorder;
+use crate::support::socket::status;
+use crate::support::trio::{let_pass, start_daemon, start_plant};
+use crate::support::turns;
+
+const LIMIT: &str = "\n[setpoint]\non_violation = \"limit\"\n[limits]\nvelocity_m_s = 0.12\nacceleration_m_s2 = 1.0\njerk_m_s3 = 20.0\n";
+
+/// Stamp [ms], then two coordinates about home; the order in the text is that of the file.
+const FORMAT: &str = "encoding = \"text\"\nstamp = { at = 0, unit = \"ms\" }\n\
+                      y = { at = 2, unit = \"mm\" }\ngamma = { at = 1, unit = \"mrad\" }\n";
+
+/// Heave of the platform of the paper, whose third axis is y here [m], and gamma [rad].
+fn flight(t: f64) -> [f64; 2] {
+    let (sin, cos) = (2.0 * std::f64::consts::PI * 0.3 * t).sin_cos();
+    [0.02 * sin, 0.03 * cos]
+}
+
+/// Sends 60 datagrams a second for some seconds, a tenth of which is lost. Returns the instants between which they were sent.
+fn send(socket: &UdpSocket, to: &str, began: Instant, seconds: f64, jumps: bool) -> [u64; 2] {
+    let from_ns = monotonic_ns();
+    let mut random = 7_u32;
+    let since = began.elapsed().as_secs_f64();
+    for k in 0..(60.0 * seconds) as u32 {
+        let t = since + f64::from(k) / 60.0;
+        while began.elapsed().as_secs_f64() < t {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if random >> 24 < 26 {
+            continue;
+        }
+        let [y, gamma] = flight(t);
+        let jump = if jumps && k % 60 < 30 { 0.08 } else { 0.0 };
+        // The clock of the game is not that of the host.
+        let line = format!("{:.3};{:.4};{:.4}\n", 1e3 * t + 5e5, 1e3 * gamma, 1e3 * (y + jump));
+        socket.send_to(line.as_bytes(), to).unwrap();
+    }
+    [from_ns, monotonic_ns()]
+}
+
+/// RMS deviation of the true motion from the flight that was sent, with the lag at which it is least [m], [s].
+fn deviation(
+    measured: &[MeasuredMessage],
+    home_y: f64,
+    began_ns: u64,
+    [from_ns, to_ns]: [u64; 2],
+) -> [f64; 2] {
+    let within = measured.iter().filter(|m| (from_ns..to_ns).contains(&m.header.time_ns));
+    let motion: Vec<_> =
+        within.map(|m| (1e-9 * (m.header.time_ns - began_ns) as f64, m.x[4] - home_y)).collect();
+    assert!(motion.len() > 1000, "{} measurements", motion.len());
+    let rms = |lag: f64| {
+        let squares: f64 = motion.iter().map(|(t, y)| (y - flight(t - lag)[0]).powi(2)).sum();
+        (squares / motion.len() as f64).sqrt()
+    };
+    let lags = (0..300).map(|k| 1e-3 * f64::from(k));
+    lags.map(|lag| [rms(lag), lag]).min_by(|a, b| a[0].total_cmp(&b[0])).unwrap()
+}
+
+#[test]
+fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
+    let _turn = turns::beside_others();
+    let machine = Machine::with("udp", &format!("{PATIENT}{LIMIT}"));
+    let recorder = Recorder::start(&machine.name);
+    let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+    fs::write(machine.path("game.toml"), FORMAT).unwrap();
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    // A free port, which the player binds next.
+    let to = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let format = machine.path("game.toml").display().to_string();
+    let line = ["--udp", &to, "--format", &format, "--engage", "--boarding", "0,0,0,1.08m,0,0"];
+    let player = Hexad::start(&machine, "move", &line);
+    daemon.says("active");
+    player.says("waits for datagrams");
+    let (began, began_ns) = (Instant::now(), monotonic_ns());
+    let at = |name: &str| {
+        let answer = status(&machine);
+        assert_eq!(answer["state"], "active", "{name}: {answer}");
+        let pose: [f64; 6] =
+            std::array::from_fn(|k| answer["status"]["pose"][k].as_f64().unwrap_or(f64::NAN));
+        pose
+    };
+    send(&socket, &to, began, 1.0, false);
+    player.says("follows the stream");
+    socket.send_to(b"1;2", &to).unwrap();
+    let first = send(&socket, &to, began, 6.0, false);
+    let_pass(Duration::from_secs(2));
+    let stood = at("in a pause");
+    let_pass(Duration::from_millis(300));
+    assert!((at("in a pause")[4] - stood[4]).abs() < 1e-4, "must stand in a pause");
+    let second = send(&socket, &to, began, 5.5, false);
+    send(&socket, &to, began, 2.0, true);
+    player.signal("INT");
+    let ended = player.ends_within(HANG);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = ended.stderr;
+    assert!(ended.contains("a pause: the platform stands"), "{ended}");
+    assert!(ended.contains("it has not the numbers of --format"), "{ended}");
+    let boarded = at("at the end");
+    assert!((boarded[3] - 1.08).abs() < 1e-3 && boarded[4].abs() < 1e-3, "{boarded:?}");
+    let said = daemon.stops_on("TERM", HANG).stderr;
+    assert!(!said.contains("fault") && said.matches("active:").count() == 1, "{said}");
+    plant.stops_on("TERM", HANG);
+
+    let measured = recorder.finish().measured;
+    for (name, [from_ns, to_ns]) in [("first", first), ("second", second)] {
+        // After the blend.
+        let [rms, lag] = deviation(&measured, 0.0, began_ns, [from_ns + 3_500_000_000, to_ns]);
+        println!("{name}: RMS {:.3} mm after a lag of {:.0} ms", 1e3 * rms, 1e3 * lag);
+        assert!(rms < 4e-3, "{name}: {rms} m after {lag} s");
+    }
+    let fastest = measured.windows(11).map(|pair| {
+        let [a, b] = [&pair[0], &pair[10]];
+        let way: f64 = (3..6).map(|k| (b.x[k] - a.x[k]).powi(2)).sum();
+        way.sqrt() / (1e-9 * (b.header.time_ns - a.header.time_ns) as f64)
+    });
+    let fastest = fastest.fold(0.0, f64::max);
+    println!("fastest {fastest:.4} m/s");
+    assert!(
+        (0.1..1.02 * 0.12).contains(&fastest),
+        "the jumps are taken at the limit, and no faster: {fastest} m/s"
+    );
+}
+
+#[test]
+fn an_open_address_a_wrong_format_and_an_unfit_file_are_refused() {
+    let _turn = turns::beside_others();
+    let fit = Machine::with("udp-refused", LIMIT);
+    let unfit = Machine::with("udp-stop", "");
+    let refused = |machine: &Machine, more: &[&str], words: &str| {
+        let file = machine.file.display().to_string();
+        let ended = run(machine, &[&["move", "--config", &file], more].concat());
+        assert_eq!(ended.status.code(), Some(2), "{more:?}: {}", ended.stderr);
+        assert!(ended.stderr.contains(words), "{words:?} must be in {}", ended.stderr);
+    };
+    refused(
+        &unfit,
+        &["--udp", "127.0.0.1:4123", "--format", "simtools"],
+        "setpoint.on_violation = \"limit\"",
+    );
+    refused(&fit, &["--udp", "127.0.0.1:4123"], "needs --format");
+    refused(
+        &fit,
+        &["--udp", "127.0.0.1:4123", "--format", "none"],
+        "no such file; the formats with a name are",
+    );
+    refused(&fit, &["--udp", "0.0.0.0:4123", "--format", "simtools"], "must be the address of one interface");
+    refused(&fit, &["--udp", "192.0.2.1:4123", "--format", "simtools"], "with --from");
+    refused(
+        &fit,
+        &["--udp", "127.0.0.1:4123", "--format", "simtools", "--boarding", "0,0,0,9m,0,0"],
+        "workspace",
+    );
+}
