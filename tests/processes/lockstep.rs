@@ -200,7 +200,8 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
 #[test]
 fn in_lock_step_a_source_begins_where_the_platform_is_held() {
     let _turn = turns::beside_others();
-    let machine = Machine::with("lock-step-held", LOCKSTEP);
+    let follows_any = "\n[setpoint]\non_violation = \"limit\"\n";
+    let machine = Machine::with("lock-step-held", &format!("{LOCKSTEP}{follows_any}"));
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
     for (from, to, option) in [(0.0, 0.02, "--engage"), (0.02, 0.0, "--hold"), (0.0, 0.01, "--hold")] {

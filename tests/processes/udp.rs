@@ -1,26 +1,31 @@
 //! `hexad move --udp`: a recorded flight, with lost datagrams, pauses, a jump and strangers.
 
-use std::fs;
+use std::io::Write;
 use std::net::UdpSocket;
+use std::path::PathBuf;
+use std::process::Command;
 use std::time::{Duration, Instant};
+use std::{env, fs};
 
 use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
 
-use crate::support::children::{HANG, Hexad, run};
-use crate::support::machine::{Machine, PATIENT};
+use crate::support::children::{HANG, Hexad, hexad, run};
+use crate::support::machine::Machine;
 use crate::support::recorder::Recorder;
 use crate::support::socket::status;
 use crate::support::trio::{let_pass, start_daemon, start_plant};
 use crate::support::turns;
 
-const LIMIT: &str = "\n[setpoint]\non_violation = \"limit\"\n[limits]\nvelocity_m_s = 0.12\nacceleration_m_s2 = 1.0\njerk_m_s3 = 20.0\n";
+const GUIDE: &str = include_str!("../../docs/motion_simulator.md");
 
-/// Stamp [ms], then two coordinates about home; the order in the text is that of the file.
-const FORMAT: &str = "encoding = \"text\"\nstamp = { at = 0, unit = \"ms\" }\n\
-                      y = { at = 2, unit = \"mm\" }\ngamma = { at = 1, unit = \"mrad\" }\n";
+/// A block of the guide: sections of the machine file, then a format.
+fn block(index: usize) -> &'static str {
+    let (block, _) = GUIDE.split("```toml\n").nth(index).unwrap().split_once("```").unwrap();
+    block
+}
 
-/// Heave of the platform of the paper, whose third axis is y here [m], and gamma [rad].
+/// A horizontal coordinate of the platform of the paper, y \[m\], and gamma \[rad\].
 fn flight(t: f64) -> [f64; 2] {
     let (sin, cos) = (2.0 * std::f64::consts::PI * 0.3 * t).sin_cos();
     [0.02 * sin, 0.03 * cos]
@@ -43,13 +48,14 @@ fn send(socket: &UdpSocket, to: &str, began: Instant, seconds: f64, jumps: bool)
         let [y, gamma] = flight(t);
         let jump = if jumps && k % 60 < 30 { 0.08 } else { 0.0 };
         // The clock of the game is not that of the host.
-        let line = format!("{:.3};{:.4};{:.4}\n", 1e3 * t + 5e5, 1e3 * gamma, 1e3 * (y + jump));
+        let line =
+            format!("{:.3};0;{:.4};0;0;0;{:.4}\n", 1e3 * t + 5e5, 1e3 * (y + jump), gamma.to_degrees());
         socket.send_to(line.as_bytes(), to).unwrap();
     }
     [from_ns, monotonic_ns()]
 }
 
-/// RMS deviation of the true motion from the flight that was sent, with the lag at which it is least [m], [s].
+/// RMS deviation of the true motion from the flight that was sent, with the lag at which it is least \[m\], \[s\].
 fn deviation(
     measured: &[MeasuredMessage],
     home_y: f64,
@@ -71,15 +77,18 @@ fn deviation(
 #[test]
 fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
     let _turn = turns::beside_others();
-    let machine = Machine::with("udp", &format!("{PATIENT}{LIMIT}"));
+    let machine = Machine::with("udp", block(1));
     let recorder = Recorder::start(&machine.name);
     let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
-    fs::write(machine.path("game.toml"), FORMAT).unwrap();
+    fs::write(machine.path("game.toml"), block(2)).unwrap();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     // A free port, which the player binds next.
     let to = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     let format = machine.path("game.toml").display().to_string();
-    let line = ["--udp", &to, "--format", &format, "--engage", "--boarding", "0,0,0,1.08m,0,0"];
+    let shown =
+        "hexad move --config F --udp 127.0.0.1:4123 --format game.toml --boarding 0,0,0,1.08m,0,0 --engage";
+    assert!(GUIDE.contains(shown));
+    let line = ["--udp", &to, "--format", &format, "--boarding", "0,0,0,1.08m,0,0", "--engage"];
     let player = Hexad::start(&machine, "move", &line);
     daemon.says("active");
     player.says("waits for datagrams");
@@ -136,7 +145,7 @@ fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
 #[test]
 fn an_open_address_a_wrong_format_and_an_unfit_file_are_refused() {
     let _turn = turns::beside_others();
-    let fit = Machine::with("udp-refused", LIMIT);
+    let fit = Machine::with("udp-refused", block(1));
     let unfit = Machine::with("udp-stop", "");
     let refused = |machine: &Machine, more: &[&str], words: &str| {
         let file = machine.file.display().to_string();
@@ -162,4 +171,42 @@ fn an_open_address_a_wrong_format_and_an_unfit_file_are_refused() {
         &["--udp", "127.0.0.1:4123", "--format", "simtools", "--boarding", "0,0,0,9m,0,0"],
         "workspace",
     );
+}
+
+/// A button that is pressed, and one that is unplugged.
+#[test]
+fn a_usb_button_is_an_emergency_stop() {
+    let _turn = turns::beside_others();
+    for is_pressed in [true, false] {
+        let machine = Machine::with("button", "");
+        let daemon = start_daemon(&machine);
+        let device = machine.path("device");
+        assert!(Command::new("mkfifo").arg(&device).status().unwrap().success());
+        let hexad = PathBuf::from(hexad().get_program());
+        let path = format!("{}:{}", hexad.parent().unwrap().display(), env::var("PATH").unwrap());
+        let mut button = Command::new("python3");
+        button
+            .arg("examples/estop_button.py")
+            .arg(&device)
+            .arg("--config")
+            .arg(&machine.file)
+            .env("PATH", path);
+        let mut button = button.spawn().unwrap();
+        let mut events = fs::File::create(&device).unwrap();
+        if is_pressed {
+            let mut event = [0; 24];
+            (event[16], event[20]) = (1, 1);
+            events.write_all(&event).unwrap();
+            daemon.says("emergency stop");
+        }
+        drop(events);
+        assert!(button.wait().unwrap().success());
+        let answer = status(&machine);
+        assert_eq!(
+            (&answer["state"], &answer["diagnostic"]["code"]),
+            (&"fault".into(), &110.into()),
+            "{answer}"
+        );
+        daemon.stops_on("TERM", HANG);
+    }
 }

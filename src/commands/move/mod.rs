@@ -11,7 +11,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use tracing::info;
@@ -229,7 +229,14 @@ fn run(
     // Every status is needed, because a state may last one cycle.
     let mut playback = Playback::new(config, trajectory, is_to_hold, bus.subscriber(usize::MAX)?, engagement);
     if bus.is_simulated() {
-        while !stop.is_requested() && !playback.may_join() {
+        let began = Instant::now();
+        while let Err(reason) = playback.may_join() {
+            if stop.is_requested() {
+                return Err(MoveError::Interrupted);
+            }
+            if let Some(within) = engage_within.filter(|within| began.elapsed() > *within) {
+                return Err(MoveError::NotEngaged(within.as_secs_f64(), reason));
+            }
             thread::sleep(JOIN_INTERVAL);
         }
         run_in_lockstep(config, bus.subscriber(8)?, playback, bus.publisher()?, stop)?;

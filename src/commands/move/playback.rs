@@ -100,19 +100,13 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Whether the source may join. In lock-step the daemon follows a source from its first message on, so that a platform that is
-    /// held can be taken over only before it.
-    pub fn may_join(&mut self) -> bool {
-        match held_x(self.config) {
-            Ok(held) => {
-                self.phase = held.map_or(Phase::Waiting, |x| Phase::Standing(self.timeline(&x.into())));
-                true
-            }
-            Err(reason) => {
-                self.log_reason(&format!("waiting: {reason}"));
-                false
-            }
-        }
+    /// Whether the source may join, else the reason. In lock-step the daemon follows a source from its first message on, so that a
+    /// platform that is held can be taken over only before it.
+    pub fn may_join(&mut self) -> Result<(), String> {
+        let held =
+            held_x(self.config).inspect_err(|reason| self.log_reason(&format!("waiting: {reason}")))?;
+        self.phase = held.map_or(Phase::Waiting, |x| Phase::Standing(self.timeline(&x.into())));
+        Ok(())
     }
 
     /// Reads all new statuses. An error if control has ended.

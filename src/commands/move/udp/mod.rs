@@ -195,8 +195,7 @@ struct Receiver {
     /// Datagrams since the last pause.
     lively: u32,
     accepted: u64,
-    /// Rejected: of other senders, not readable, late or repeated.
-    rejected: [u64; 3],
+    rejected: [(Rejection, u64); 3],
 }
 
 impl Receiver {
@@ -224,7 +223,7 @@ impl Receiver {
             last_ns: 0,
             lively: 0,
             accepted: 0,
-            rejected: [0; 3],
+            rejected: [Rejection::Sender, Rejection::Format, Rejection::Late].map(|reason| (reason, 0)),
         })
     }
 
@@ -237,12 +236,7 @@ impl Receiver {
             let arrival_ns = monotonic_ns();
             match self.sample(bytes.get(..size).unwrap_or_default(), sender.ip(), arrival_ns) {
                 Ok(sample) => newest = Some(sample),
-                Err(Rejection(reason)) => {
-                    if self.rejected[reason] == 0 {
-                        warn!(%sender, "a datagram is rejected: {}", REASONS[reason]);
-                    }
-                    self.rejected[reason] += 1;
-                }
+                Err(rejection) => self.count(rejection, sender),
             }
         }
         newest
@@ -255,17 +249,26 @@ impl Receiver {
         arrival_ns: u64,
     ) -> Result<(u64, [f64; 6]), Rejection> {
         if !self.from.is_empty() && !self.from.contains(&sender) {
-            return Err(Rejection(0));
+            return Err(Rejection::Sender);
         }
         let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
-        let Datagram { stamp_s, x } = datagram.ok_or(Rejection(1))?;
+        let Datagram { stamp_s, x } = datagram.ok_or(Rejection::Format)?;
         let instant =
             |stamp_s: f64| self.clock.instant_ns((stamp_s * 1e9) as i64, arrival_ns as i64, self.max_age_ns);
-        let time_ns = stamp_s.map_or(Some(arrival_ns as i64), instant).ok_or(Rejection(2))?;
+        let time_ns = stamp_s.map_or(Some(arrival_ns as i64), instant).ok_or(Rejection::Late)?;
         let is_pause = self.silence_s(arrival_ns) > self.pause_s;
         self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
         (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);
         Ok((time_ns as u64, x))
+    }
+
+    fn count(&mut self, rejection: Rejection, sender: SocketAddr) {
+        for (_, count) in self.rejected.iter_mut().filter(|(reason, _)| *reason == rejection) {
+            if *count == 0 {
+                warn!(%sender, "a datagram is rejected: {rejection}");
+            }
+            *count += 1;
+        }
     }
 
     fn silence_s(&self, now_ns: u64) -> f64 {
@@ -277,19 +280,23 @@ impl Receiver {
     }
 
     fn log_totals(&self) {
-        let [senders, unreadable, late] = self.rejected;
-        info!(accepted = self.accepted, senders, unreadable, late, "datagrams");
+        info!("{} datagrams accepted", self.accepted);
+        for (reason, count) in self.rejected.iter().filter(|(_, count)| *count > 0) {
+            info!("{count} rejected: {reason}");
+        }
     }
 }
 
-/// A datagram that is not followed, by its place in [`REASONS`].
-struct Rejection(usize);
-
-const REASONS: [&str; 3] = [
-    "its sender is not among --from",
-    "it has not the numbers of --format",
-    "it is late against the stream, or older than the newest",
-];
+/// Reason why a datagram is not followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+enum Rejection {
+    #[error("its sender is not among --from")]
+    Sender,
+    #[error("it has not the numbers of --format")]
+    Format,
+    #[error("it is late against the stream, or older than the newest")]
+    Late,
+}
 
 fn seconds(from_ns: u64, to_ns: u64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 * 1e-9
