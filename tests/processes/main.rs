@@ -28,6 +28,7 @@ mod examined;
 mod excite;
 mod fidelity;
 mod frames;
+mod guides;
 mod hosted;
 mod identify;
 mod in_force;

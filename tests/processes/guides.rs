@@ -1,0 +1,59 @@
+//! The commands of the guides for positioners and machine builders, as a user types them.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::machine::Machine;
+use crate::support::trio::{start_daemon, start_plant};
+use crate::support::turns;
+
+const POSITIONER: &str = include_str!("../../docs/positioner.md");
+const BUILDER: &str = include_str!("../../docs/machine_builder.md");
+
+/// First block of a guide in a language.
+fn block<'a>(guide: &'a str, language: &str) -> &'a str {
+    let (_, rest) = guide.split_once(&format!("```{language}\n")).unwrap();
+    rest.split_once("```").unwrap().0
+}
+
+/// Types the commands in the folder of the machine: with a shorter raster, and beside other tests.
+fn type_commands(machine: &Machine, guide: &str) {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    for line in block(guide, "sh").lines() {
+        let line = line.split('#').next().unwrap().trim();
+        let line = line
+            .replace("--config F", "--config machine.toml")
+            .replace("raster.py 20", "raster.py 2")
+            .replace("--seconds 5", "--seconds 2 --disturb");
+        let mut command = Command::new("sh");
+        let program = hexad().get_program().display().to_string();
+        let line = line
+            .replacen("hexad", &program, 1)
+            .replace("examples/", &format!("{}/examples/", root.display()));
+        command.current_dir(machine.folder()).args(["-c", &line]);
+        let ended = Hexad::spawn(machine, "guide", command).ends_within(2 * HANG);
+        assert_eq!(ended.status.code(), Some(0), "{line}: {}{}", ended.stdout, ended.stderr);
+    }
+}
+
+#[test]
+fn a_positioner_turns_about_its_vertex_and_scans() {
+    let _turn = turns::beside_others();
+    let machine = Machine::with("positioner", "");
+    let text = include_str!("../data/mirror_stiction.toml");
+    let text = text.replace("name = \"mirror_stiction\"", &format!("name = \"{}\"", machine.name));
+    fs::write(&machine.file, format!("{text}\n{}", block(POSITIONER, "toml"))).unwrap();
+    let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+    type_commands(&machine, POSITIONER);
+    let said = daemon.stops_on("TERM", HANG).stderr;
+    assert!(!said.contains("fault") && said.matches("active:").count() == 1, "{said}");
+    plant.stops_on("TERM", HANG);
+}
+
+#[test]
+fn a_machine_builder_examines_machine_and_host() {
+    let _turn = turns::beside_others();
+    type_commands(&Machine::with("builder", ""), BUILDER);
+}
