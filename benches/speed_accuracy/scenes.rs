@@ -71,7 +71,7 @@ impl Scene {
         let paper_machine = paper::Machine::load(name);
         let mut columns = trajectory_columns();
         columns.extend(legs("force"));
-        let table = NumberTable::read(&data(name, "csv"), &columns, &[])?;
+        let table = NumberTable::read(&data(name, "csv"), None, &columns, &[])?;
         let slower = if pace == Pace::Slow { SLOWER } else { 1.0 };
         let (mut states, mut motions, mut reference) = (vec![], vec![], vec![]);
         for row in table.rows() {
@@ -106,7 +106,7 @@ impl Scene {
             columns.extend(["x", "y", "z"].map(|axis| format!("{stem}_{axis}")));
         }
         columns.extend(legs("force"));
-        let table = NumberTable::read(inputs, &columns, &[])?;
+        let table = NumberTable::read(inputs, None, &columns, &[])?;
         let mut motions = vec![];
         for row in table.rows() {
             let three = |at: usize| {

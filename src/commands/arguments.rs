@@ -4,9 +4,15 @@ use core::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
 use crate::config::{Config, ConfigError};
+use crate::output::csv_table::GROUPS;
+
+/// Help text of `--group`.
+pub const GROUP_HELP: &str =
+    "Group of columns to read from a table of hexad convert; else setpoint, or the only one";
 
 /// Configuration of demonstrations and diagnoses without `--config`.
 pub const DEFAULT_CONFIG: &str = include_str!("../../config/fried2008.toml");
@@ -68,6 +74,8 @@ pub struct TableFiles {
     pub output: PathBuf,
     #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name())]
     pub rotation: OrientationFormat,
+    #[arg(long, help = GROUP_HELP, value_name = "GROUP", value_parser = PossibleValuesParser::new(GROUPS))]
+    pub group: Option<String>,
 }
 
 /// Duration \[s\] of a motion, a wait or a measurement.

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::failure::Failure;
+use super::report::signals::CycleInstants;
 use crate::config::Config;
 use crate::output::files::{is_standard, print};
 use crate::recording::reader::Recording;
-use crate::recording::table::write_csv;
+use crate::recording::table::{TableOrigin, write_csv};
 
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
@@ -25,7 +26,9 @@ impl ConvertArguments {
         let recording = Recording::open(&self.recording)?;
         let info = recording.summary()?.info;
         let config = Config::parse(&info.configuration, "configuration of the recording")?;
-        let summary = write_csv(&recording, &config.machine.home, &self.csv)?;
+        let CycleInstants { reference_ns, .. } = CycleInstants::of_controller(&config);
+        let origin = TableOrigin { home: config.machine.home, reference_ns };
+        let summary = write_csv(&recording, &origin, &self.csv)?;
         if is_standard(&self.csv) {
             return Ok(());
         }

@@ -39,7 +39,8 @@ pub enum StartPose {
 impl ForwardKinematicsArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let machine = self.machine.load()?.machine;
-        let table = NumberTable::read(&self.files.input, &length_columns(), &legs("length_rate"))?;
+        let TableFiles { input, group, .. } = &self.files;
+        let table = NumberTable::read(input, group.as_deref(), &length_columns(), &legs("length_rate"))?;
         let (mut output, result) = forward_kinematics(&machine, self.start, self.files.rotation, &table);
         output.save(&self.files.output).map_err(Failure::before_start)?;
         Ok(result?)

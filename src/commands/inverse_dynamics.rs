@@ -30,7 +30,8 @@ pub struct InverseDynamicsArguments {
 impl InverseDynamicsArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let machine = self.machine.load()?.machine;
-        let table = read_trajectory(&self.files.input, self.files.rotation, &machine.home)?;
+        let TableFiles { input, rotation, group, .. } = &self.files;
+        let table = read_trajectory(input, group.as_deref(), *rotation, &machine.home)?;
         let (mut output, result) = inverse_dynamics(&machine, self.fidelity, &table);
         output.save(&self.files.output).map_err(Failure::before_start)?;
         Ok(result?)

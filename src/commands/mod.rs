@@ -15,7 +15,7 @@ use self::doctor::DoctorArguments;
 use self::excite::ExciteArguments;
 use self::export::ExportArguments;
 use self::failure::Failure;
-use self::faults::FaultTables;
+use self::faults::FaultsArguments;
 use self::forward_kinematics::ForwardKinematicsArguments;
 use self::frame::FrameArguments;
 use self::goto::GotoArguments;
@@ -24,6 +24,7 @@ use self::identify::IdentifyArguments;
 use self::inverse_dynamics::InverseDynamicsArguments;
 use self::jog::JogArguments;
 use self::log::{FORMAT_VARIABLE, LogFormat};
+use self::manuals::ManualsArguments;
 use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::record::RecordArguments;
@@ -37,7 +38,6 @@ use self::status::StatusArguments;
 use self::view::ViewArguments;
 use self::workspace::WorkspaceArguments;
 use crate::control::signals::state::Request;
-use crate::output::files::print;
 use crate::output::version::VERSION;
 use crate::realtime::stop_request::Stop;
 
@@ -62,6 +62,7 @@ pub mod inverse_dynamics;
 mod jog;
 pub mod log;
 mod machine_file;
+mod manuals;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;
@@ -129,7 +130,7 @@ enum CommandArguments {
     /// Show the charts of a recording's page live, for a browser on this host
     View(ViewArguments),
     /// Show what the numbers of states, faults and limits mean, and what to do
-    Faults,
+    Faults(FaultsArguments),
     /// Print the declarations of the messages for a driver in another language
     Messages(MessagesArguments),
     /// Show the named frames of a machine file, or set one where the platform is
@@ -160,6 +161,9 @@ enum CommandArguments {
     InverseDynamics(InverseDynamicsArguments),
     /// Poses, and twists if there are rates, for a file of leg lengths
     ForwardKinematics(ForwardKinematicsArguments),
+    /// Write manual pages and completions of shells into a folder
+    #[command(hide = true)]
+    Manuals(ManualsArguments),
 }
 
 impl CommandLine {
@@ -189,7 +193,7 @@ impl CommandLine {
             Is::Reload(arguments) => arguments.reload(),
             Is::Status(arguments) => arguments.execute(),
             Is::View(arguments) => arguments.execute(),
-            Is::Faults => Ok(print(FaultTables)?),
+            Is::Faults(arguments) => arguments.execute(),
             Is::Messages(arguments) => arguments.execute(),
             Is::Frame(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
@@ -205,6 +209,7 @@ impl CommandLine {
             Is::Recover(arguments) => arguments.execute(),
             Is::InverseDynamics(arguments) => arguments.execute(),
             Is::ForwardKinematics(arguments) => arguments.execute(),
+            Is::Manuals(arguments) => arguments.execute(),
         }
     }
 }

@@ -60,10 +60,11 @@ const MIN_STEP_S: f64 = 1e-6;
 /// through the poses. Each row has the triple of Bryan angles nearest to the row before, the first row nearest to `home`.
 pub fn read_trajectory(
     path: &Path,
+    group: Option<&str>,
     format: OrientationFormat,
     home: &[f64; 6],
 ) -> Result<NumberTable, TableError> {
-    let table = NumberTable::read(path, &format.pose_columns(), &derivative_columns())?;
+    let table = NumberTable::read(path, group, &format.pose_columns(), &derivative_columns())?;
     let path = name_of(path);
     let mut table = in_task_coordinates(table, format, path, home)?;
     continue_angles(&mut table, home);
@@ -173,8 +174,8 @@ mod tests {
         }
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(&file, text).unwrap();
-        read_trajectory(file.path(), OrientationFormat::OF_X, &[start[0], start[1], start[2], 0.0, 0.0, 0.65])
-            .unwrap()
+        let home = [start[0], start[1], start[2], 0.0, 0.0, 0.65];
+        read_trajectory(file.path(), None, OrientationFormat::OF_X, &home).unwrap()
     }
 
     /// As in a live stream, where poses are compared: another triple of the same orientation changes no motion.

@@ -25,12 +25,22 @@ impl CsvWriter {
 
     /// Adds a row. Numbers get the shortest digits that read back the same.
     pub fn row(&mut self, values: impl IntoIterator<Item = f64>) {
+        self.row_with_names(values, []);
+    }
+
+    /// Adds a row of numbers, then names.
+    pub fn row_with_names<'a>(
+        &mut self,
+        values: impl IntoIterator<Item = f64>,
+        names: impl IntoIterator<Item = &'a str>,
+    ) {
         for value in values {
             self.field.clear();
             // Debug is the shortest round trip, with an exponent where that is shorter.
             let _ = write!(self.field, "{value:?}");
             let _ = self.text.write_field(&self.field);
         }
+        names.into_iter().for_each(|name| drop(self.text.write_field(name)));
         let _ = self.text.write_record(None::<&[u8]>);
     }
 

@@ -3,6 +3,7 @@
 pub mod axis;
 pub mod charts;
 mod csv_columns;
+mod csv_groups;
 pub mod csv_rows;
 pub mod csv_table;
 pub mod csv_writer;

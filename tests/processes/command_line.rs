@@ -5,6 +5,8 @@ use std::fs::File;
 use std::path::Path;
 use std::process::Stdio;
 
+use hexad::control::signals::diagnostic::DiagnosticCode;
+
 use crate::support::children::{Ended, HANG, hexad, run};
 use crate::support::machine::Machine;
 use crate::support::trio::start_daemon;
@@ -40,6 +42,10 @@ fn what_is_typed_wrong_is_refused() {
     refused(
         &["move", "--config", "FILE", "--trajectory", "t.csv", "--seconds", "3"],
         &["cannot be used with", "--seconds <SECONDS>"],
+    );
+    refused(
+        &["move", "--config", "FILE", "--motion", "sines", "--group", "reference"],
+        &["cannot be used with", "--group <GROUP>"],
     );
     refused(&["move", "--config", "FILE", "--motion", "waltz"], &["'waltz'", "sines"]);
     refused(&["run", "--config", "FILE", "--fast"], &["unexpected argument '--fast'"]);
@@ -166,4 +172,60 @@ fn a_daemon_says_that_its_loop_is_bold() {
     daemon.says("WARN control.position_bandwidth_hz = 28.724: legs loop: with 2.10 periods of delay it is stable with");
     daemon.says("running");
     daemon.stops_on("TERM", HANG);
+}
+
+#[test]
+fn a_diagnostic_is_explained_by_its_number() {
+    let machine = Machine::patient("faults");
+    let ended = run(&machine, &["faults", "125"]);
+    let words = ended.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    let expected = "125 sensor frozen The readings of a leg stayed the same to the last bit while its reference moved. \
+                    Forces are disabled and the brakes close at once; fault until cleared. To do: check the encoder of this leg and \
+                    the driver";
+    assert_eq!((ended.status.code(), words.as_str()), (Some(0), expected));
+    for number in ["0", "99", "-1", "x"] {
+        let ended = run(&machine, &["faults", "--", number]);
+        assert_eq!(ended.status.code(), Some(2), "{number}: {}", ended.stdout);
+        assert!(ended.stderr.contains("must be the number of a diagnostic"), "{number}: {}", ended.stderr);
+    }
+    let json = |arguments: &[&str]| -> Vec<serde_json::Value> {
+        serde_json::from_str(&run(&machine, arguments).stdout).expect("JSON")
+    };
+    let all = json(&["faults", "--json"]);
+    assert_eq!(all.len() + 1, DiagnosticCode::ALL.len());
+    for entry in &all {
+        for text in ["name", "cause", "reaction", "remedy"] {
+            assert!(entry[text].as_str().is_some_and(|text| !text.trim().is_empty()), "{text}: {entry}");
+        }
+    }
+    let one = json(&["faults", "125", "--json"]);
+    assert!(one.len() == 1 && all.contains(&one[0]) && one[0]["reaction"] == "brake", "{one:?}");
+}
+
+/// As after `cargo install`, which installs nothing but the program.
+#[test]
+fn manual_pages_and_completions_are_written_by_the_program() {
+    let machine = Machine::patient("manuals");
+    let folder = machine.path("manuals");
+    let ended = run(&machine, &["manuals", folder.to_str().expect("a plain name")]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let help = run(&machine, &["--help"]).stdout;
+    let commands: Vec<_> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  ")?.split_once(' ').filter(|(name, _)| !name.is_empty()))
+        .map(|(name, _)| name)
+        .filter(|name| *name != "help")
+        .collect();
+    assert!(commands.len() > 30 && !commands.contains(&"manuals"), "{commands:?}");
+    for command in commands {
+        let page = std::fs::read_to_string(folder.join(format!("man/hexad-{command}.1")));
+        assert!(page.is_ok_and(|page| page.contains(".SH NAME")), "{command}");
+    }
+    for shell in ["hexad.bash", "_hexad", "hexad.fish"] {
+        let text = std::fs::read_to_string(folder.join("completions").join(shell)).expect(shell);
+        assert!(text.contains("inverse-dynamics"), "{shell}");
+    }
 }

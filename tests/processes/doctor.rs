@@ -27,6 +27,13 @@ fn a_controller_at_work_is_not_disturbed_unasked() {
     assert_eq!(status.code(), Some(2), "{stderr}");
     assert!(stderr.starts_with("hexad: not measured: it would delay the controller of process "), "{stderr}");
     assert!(stdout.contains("kernel  ") && !stdout.contains("wake-up"), "facts disturb nobody:\n{stdout}");
+    let Ended { status, stdout, .. } = run(&machine, &["doctor", "--seconds", "1", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_eq!(
+        (status.code(), &json["verdict"], json["rates"].as_array().map(Vec::len)),
+        (Some(2), &serde_json::Value::Null, Some(0))
+    );
+    assert!(json["facts"].as_array().is_some_and(|facts| !facts.is_empty()), "{json}");
     daemon.stops_on("TERM", HANG);
     plant.stops_on("TERM", HANG);
 }

@@ -38,8 +38,8 @@ fn the_file_holds_the_motion_that_would_be_played() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let config = Config::load(Path::new(config)).unwrap();
     let excitation = Trajectory::excitation(&config, 2, 0.3, 0).unwrap();
-    let read =
-        Trajectory::from_file(&config, &Coordinates::default(), &file, OrientationFormat::OF_X).unwrap();
+    let read = Trajectory::from_file(&config, &Coordinates::default(), &file, None, OrientationFormat::OF_X)
+        .unwrap();
     assert_eq!(read.duration(), excitation.duration());
     for k in 0..3400 {
         let t = 0.01 * f64::from(k) + 0.0037;

@@ -4,8 +4,10 @@ use core::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use clap::builder::PossibleValuesParser;
+
 use self::report::{AdviceReport, FidelityRow, SCHEMA};
-use super::arguments::MachineFile;
+use super::arguments::{GROUP_HELP, MachineFile};
 use super::failure::{CommandError, Failure};
 use super::offline_tables::{read_trajectory, task_state};
 use super::orientation::{OrientationFormat, ROTATION_HELP};
@@ -18,7 +20,7 @@ use crate::config::fidelity::envelope;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::rigid::Motion;
-use crate::output::csv_table::NumberTable;
+use crate::output::csv_table::{GROUPS, NumberTable};
 use crate::output::files::{print, print_json};
 use crate::output::numbers::{AXES, axis_unit, significant};
 use crate::output::text_table::{Left, Right, text_table};
@@ -41,6 +43,8 @@ pub struct AdviseArguments {
     trajectory: Option<PathBuf>,
     #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz", value_parser = OrientationFormat::by_name(), requires = "trajectory")]
     rotation: OrientationFormat,
+    #[arg(long, help = GROUP_HELP, value_name = "GROUP", value_parser = PossibleValuesParser::new(GROUPS), requires = "trajectory")]
+    group: Option<String>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -50,8 +54,8 @@ impl AdviseArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let config = self.machine.load()?;
         let path = self.trajectory.as_deref();
-        let table =
-            path.map(|path| read_trajectory(path, self.rotation, &config.machine.home)).transpose()?;
+        let read = |path| read_trajectory(path, self.group.as_deref(), self.rotation, &config.machine.home);
+        let table = path.map(read).transpose()?;
         let report = advise(&config, path.zip(table.as_ref()))?;
         if self.json {
             print_json(&report)?

@@ -38,7 +38,7 @@ mod text;
 pub mod verdict;
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 
 #[derive(Debug, Args)]
 pub struct DoctorArguments {
@@ -113,8 +113,8 @@ pub struct Diagnosis {
     pub seconds: f64,
     pub facts: Vec<Fact>,
     pub rates: Vec<RateVerdict>,
-    /// Verdict on the configured rate.
-    pub verdict: Feasibility,
+    /// Verdict on the configured rate; `None` if a controller on the CPU prevented the measurement.
+    pub verdict: Option<Feasibility>,
 }
 
 /// Examines the host, measures, and prints facts and verdicts.
@@ -134,8 +134,13 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
         print(style.facts(&config.name, realtime, &facts))?;
     }
 
+    let (rate_hz, release) = (realtime.rate_hz, measured_mode(realtime.release));
+    let (schema, name, cpu) = (SCHEMA, config.name, realtime.cpu);
+    let mut diagnosis =
+        Diagnosis { schema, name, rate_hz, release, cpu, seconds: 0.0, facts, rates: vec![], verdict: None };
     let controller = running::controllers(host, realtime.cpu).first().copied();
     if let Some(process) = controller.filter(|_| !doctor.disturb) {
+        show(doctor, &style, &diagnosis)?;
         return Err(DoctorError::ControllerRuns(process));
     }
     let latencies =
@@ -143,16 +148,14 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
     let is_bad = |fact: &&Fact| fact.assessment == Assessment::Bad;
     let conditions = HostConditions {
         longest_hold_ns: nanoseconds(deployment.timeouts.measured_s),
-        bad: facts.iter().filter(is_bad).map(|fact| fact.name.clone()).collect(),
+        bad: diagnosis.facts.iter().filter(is_bad).map(|fact| fact.name.clone()).collect(),
         refusal: refusal(realtime, &refused),
     };
-    let rates: Vec<_> = latencies.into_iter().map(|latency| assess(latency, &conditions)).collect();
-    let (rate_hz, release) = (realtime.rate_hz, measured_mode(realtime.release));
-    let configured = rates.iter().find(|rate| rate.latency.is_of(rate_hz, release));
+    diagnosis.seconds = doctor.seconds;
+    diagnosis.rates = latencies.into_iter().map(|latency| assess(latency, &conditions)).collect();
+    let configured = diagnosis.rates.iter().find(|rate| rate.latency.is_of(rate_hz, release));
     let verdict = configured.map_or(Feasibility::Impossible, |rate| rate.verdict);
-    let (cpu, seconds) = (realtime.cpu, doctor.seconds);
-    let (schema, name) = (SCHEMA, config.name);
-    let diagnosis = Diagnosis { schema, name, rate_hz, release, cpu, seconds, facts, rates, verdict };
+    diagnosis.verdict = Some(verdict);
     show(doctor, &style, &diagnosis)?;
     match verdict {
         Feasibility::Good | Feasibility::Marginal => Ok(()),

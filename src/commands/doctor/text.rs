@@ -57,9 +57,10 @@ impl TextStyle {
         text
     }
 
-    /// The measured latencies and the verdicts.
+    /// The measured latencies and the verdicts; empty if nothing was measured.
     pub fn rates(&self, diagnosis: &Diagnosis) -> String {
         let Diagnosis { rate_hz, release, rates, seconds, verdict, .. } = diagnosis;
+        let Some(verdict) = verdict else { return String::new() };
         let what = "wake-up after the release [us]; late: by more than late_wakeup_us, or half a period";
         let mut text = String::from("\n") + &paragraph("", what, self.width) + &self.table(rates) + "\n";
         for rate in rates {
@@ -223,7 +224,7 @@ mod tests {
             seconds,
             facts: if virtual_machine { vec![surroundings::virtual_machine()] } else { vec![] },
             rates: vec![RateVerdict { latency, verdict, reasons: vec!["it is late".into()] }],
-            verdict,
+            verdict: Some(verdict),
         }
     }
 

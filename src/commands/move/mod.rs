@@ -14,6 +14,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use tracing::info;
 
 use self::engagement::Engagement;
@@ -21,7 +22,7 @@ use self::playback::{Playback, PlaybackStep};
 use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use self::udp::StreamOptions;
-use super::arguments::{MachineFile, duration};
+use super::arguments::{GROUP_HELP, MachineFile, duration};
 use super::coordinates::FrameOptions;
 use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
 use super::orientation::{OrientationFormat, ROTATION_HELP};
@@ -37,7 +38,7 @@ use crate::messages::{PortError, Publisher, Subscriber};
 use crate::model::task::TaskState;
 use crate::motion::built_in::BuiltInMotion;
 use crate::operator::OperatorError;
-use crate::output::csv_table::TableError;
+use crate::output::csv_table::{GROUPS, TableError};
 use crate::output::numbers::percent;
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::pause_signals::PauseRequest;
@@ -65,6 +66,9 @@ pub struct MoveArguments {
     #[arg(long, help = ROTATION_HELP, value_name = "ORDER", default_value = "xyz")]
     #[arg(value_parser = OrientationFormat::by_name(), conflicts_with_all = ["motion", "udp", "pause", "resume"])]
     rotation: OrientationFormat,
+    #[arg(long, help = GROUP_HELP, value_name = "GROUP", value_parser = PossibleValuesParser::new(GROUPS))]
+    #[arg(conflicts_with_all = ["motion", "udp", "pause", "resume"])]
+    group: Option<String>,
     #[command(flatten)]
     frames: FrameOptions,
     /// Length of the motion [s]
@@ -137,7 +141,9 @@ impl MoveArguments {
         }
         let coordinates = self.frames.coordinates(&config)?;
         let trajectory = match (&self.source.trajectory, self.source.motion) {
-            (Some(path), _) => Trajectory::from_file(&config, &coordinates, path, self.rotation)?,
+            (Some(path), _) => {
+                Trajectory::from_file(&config, &coordinates, path, self.group.as_deref(), self.rotation)?
+            }
             (None, _) if !self.frames.is_empty() => {
                 return Err(Failure {
                     exit_code: 2,

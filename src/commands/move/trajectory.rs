@@ -88,10 +88,11 @@ impl Trajectory {
         config: &Config,
         coordinates: &Coordinates,
         path: &Path,
+        group: Option<&str>,
         format: OrientationFormat,
     ) -> Result<Self, SetpointError> {
         let home = config.machine.home;
-        let table = read_trajectory(path, format, &coordinates.tool_x(&home))?;
+        let table = read_trajectory(path, group, format, &coordinates.tool_x(&home))?;
         let path = name_of(path);
         let trajectory = match (Self::from_rows(&table, path)?, coordinates.is_empty()) {
             (Self::Knots(knots), false) => Self::Tool(knots, Box::new(coordinates.frames()), home),

@@ -84,7 +84,7 @@ macro_rules! reaction {
 }
 
 macro_rules! codes {
-    ($($(#[$doc:meta])* $variant:ident = $number:literal, $reaction:ident, $comparison:expr, $name:literal, $remedy:literal;)*) => {
+    ($($(#[doc = $doc:literal])* $([$default:ident])? $variant:ident = $number:literal, $reaction:ident, $comparison:expr, $name:literal, $remedy:literal;)*) => {
         /// Code of a diagnostic: the reason why the platform is not under control, or soon will not be. A
         /// code below 100 is no fault.
         ///
@@ -94,7 +94,7 @@ macro_rules! codes {
         #[allow(rustdoc::broken_intra_doc_links, reason = "remedies name sections of the configuration: [limits]")]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[repr(u32)]
-        pub enum DiagnosticCode { $($(#[$doc])* $variant = $number,)* }
+        pub enum DiagnosticCode { $($(#[doc = $doc])* $(#[$default])? $variant = $number,)* }
 
         impl DiagnosticCode {
             /// Every code, in the order of their numbers.
@@ -103,6 +103,11 @@ macro_rules! codes {
             /// Event in words.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name,)* }
+            }
+
+            /// What it means, in whole sentences.
+            pub fn cause(self) -> &'static str {
+                match self { $(Self::$variant => concat!($($doc),*),)* }
             }
 
             /// Action of the operator.
@@ -129,8 +134,7 @@ macro_rules! codes {
 
 codes! {
     /// Nothing prevents control.
-    #[default]
-    None = 0, None, NO_NUMBER, "none", "nothing";
+    [default] None = 0, None, NO_NUMBER, "none", "nothing";
     /// No measurement has arrived yet.
     NoMeasurement = 1, None, NO_NUMBER, "no measurement", "start the driver or the plant";
     /// No setpoint has arrived yet.

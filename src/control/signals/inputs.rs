@@ -26,6 +26,16 @@ pub enum SetpointKind {
 impl SetpointKind {
     /// The kinds that a message may have, in the order of their numbers.
     pub const ALL: [Self; 3] = [Self::Motion, Self::Pose, Self::Target];
+
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Pose => "pose",
+            Self::Target => "target",
+            Self::Unknown => "unknown",
+        }
+    }
 }
 
 /// Task coordinates and their derivatives that a source requests for one instant.

@@ -20,6 +20,7 @@ mod last_seconds;
 mod python;
 mod reloads;
 mod replays;
+mod tables;
 
 /// Arguments of a daemon that records.
 fn arguments(machine: &Machine) -> Vec<PathBuf> {
