@@ -1,6 +1,7 @@
 //! The commands over a veth pair, with the real daemon and with SOEM. Needs root and `ip`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
+mod failures;
 mod network;
 #[path = "../../../../tests/common/not_run.rs"]
 #[allow(dead_code, reason = "shared with the tests of hexad")]
@@ -100,33 +101,6 @@ fn the_daemon_drives_the_platform_over_the_bus() {
             );
         }
     }
-    // Killed in motion: the watchdogs of the drives close the brakes.
-    let motion = "move --config m.toml --motion sines --seconds 60 --engage";
-    network.start("move", network.hexad(motion));
-    network.wait_for("move", "in control: moving", 1);
-    sleep(Duration::from_secs(2));
-    network.signal("run", libc::SIGKILL);
-    network.wait_for("simulate", "al_status=20 drive=Fault is_brake_open=false", 6);
-    network.wait_for("daemon", "code=101", 1);
-    // The same bus, started again; an operator clears the daemon's fault, and the drives' with it.
-    network.start("run", network.driver("run d.toml m.toml"));
-    network.wait_for("run", "six drives in OP", 1);
-    network.wait_for("run", "leg 6 has the fault 0x7500", 1);
-    network.output(network.hexad("clear --config m.toml"));
-    network.wait_for("run", "faults of drives are acknowledged", 1);
-    network.signal("move", libc::SIGINT);
-    sleep(Duration::from_millis(500));
-    network.output(network.hexad("goto --config m.toml --home --engage"));
-    network.start("move", network.hexad(motion));
-    network.wait_for("move", "in control: moving", 1);
-    sleep(Duration::from_secs(1));
-    // The daemon is killed: the forces expire.
-    let stops = network.log("simulate").matches("drive=QuickStop").count();
-    network.signal("daemon", libc::SIGKILL);
-    network.wait_for("simulate", "drive=QuickStop", stops + 6);
-    network.signal("run", libc::SIGINT);
-    network.wait_for("run", "the driver ends", 1);
-    println!("{}", network.log("run"));
 }
 
 #[test]
