@@ -18,9 +18,9 @@ use crate::process_data::ProcessData;
 use crate::startup::OpDevices;
 
 /// Force on the brake, as a multiple of the load of the leg.
-pub const LOAD_FACTOR: f64 = 1.1;
+const LOAD_FACTOR: f64 = 1.1;
 /// Smallest force on the brake, as a share of the largest force of an actuator: a leg may carry nearly nothing.
-pub const MIN_LOAD_SHARE: f64 = 0.05;
+const MIN_LOAD_SHARE: f64 = 0.05;
 /// Time in which the force of the drive rises, and until the end of the test of a leg \[ns\].
 const RISE_NS: u64 = 100_000_000;
 const END_NS: u64 = 500_000_000;
@@ -33,6 +33,11 @@ const MIN_FORCE_SHARE: f64 = 0.8;
 pub fn holding_forces(machine: &Machine, pose: Pose) -> Option<[f64; LEGS]> {
     let (twist, acceleration) = (Twist::default(), Acceleration::default());
     inverse_dynamics::<Exact>(machine, &Motion { pose, twist, acceleration })
+}
+
+/// Force on the brake \[N\] in the test of a leg whose load a force holds, and whose largest force is given.
+pub fn test_load_n(holding_n: f64, max_force_n: f64) -> f64 {
+    (LOAD_FACTOR * holding_n.abs()).max(MIN_LOAD_SHARE * max_force_n)
 }
 
 /// Tests each leg that has `brake_hold`, with devices that were brought up by [`DrivesFile::with_brakes_held`]. All drives are
@@ -54,7 +59,7 @@ pub fn test<L: Link>(
         let holding_n =
             holding_n.ok_or(format!("no pose has the lengths {lengths_m:.4?} m: zero the legs"))?;
         for (leg, (section, holding_n)) in file.legs.iter().zip(holding_n).enumerate() {
-            let brake_n = (LOAD_FACTOR * holding_n.abs()).max(MIN_LOAD_SHARE * machine.actuator.max_force);
+            let brake_n = test_load_n(holding_n, machine.actuator.max_force);
             if !section.brake_hold.is_empty() && !is_stopped() {
                 test_leg(bus, devices, data, (leg, section), (holding_n, brake_n))?;
             }

@@ -1,7 +1,7 @@
 //! Test of the brakes before they open for the first time.
 
 use hexad::model::LEGS;
-use hexad_ethercat::brake_test::{self, LOAD_FACTOR, MIN_LOAD_SHARE, holding_forces};
+use hexad_ethercat::brake_test::{self, holding_forces, test_load_n};
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::cia402::DriveState;
 use hexad_ethercat::drives_file::{DrivesFile, SdoWrite};
@@ -15,8 +15,7 @@ use super::rig::Rig;
 fn test_loads() -> [f64; LEGS] {
     let machine = machine().machine;
     let holding_n = holding_forces(&machine, machine.home_pose()).unwrap();
-    let floor_n = MIN_LOAD_SHARE * machine.actuator.max_force;
-    holding_n.map(|holding_n| (LOAD_FACTOR * holding_n.abs()).max(floor_n))
+    holding_n.map(|holding_n| test_load_n(holding_n, machine.actuator.max_force))
 }
 
 /// Tests the brakes of an edited segment; the result, the segment afterwards, the motion of each leg \[mm\].
@@ -47,6 +46,13 @@ fn tested(file: &DrivesFile, edit: impl FnOnce(&mut Segment)) -> (Result<(), Str
             (after[leg] - before) * 1e3
         }),
     )
+}
+
+#[test]
+fn a_brake_bears_a_tenth_more_than_its_load_and_never_nothing() {
+    for (holding_n, brake_n) in [(3000.0, 3300.0), (-3000.0, 3300.0), (100.0, 500.0), (0.0, 500.0)] {
+        assert!((test_load_n(holding_n, 10_000.0) - brake_n).abs() < 1e-9, "{holding_n}");
+    }
 }
 
 #[test]
