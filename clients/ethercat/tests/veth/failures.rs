@@ -1,14 +1,14 @@
 //! Processes that are killed or stopped in motion: what becomes of the drives, and how far the legs still move.
 
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, MeasuredMessage, Subscriber};
 
 use super::network::Network;
 use super::stalls::Watchdog;
-use super::{ALONE, simulated};
+use super::{ALONE, not_run, simulated};
 
 /// Rate of the fastest leg at a failure, at least \[m/s\].
 const MIN_RATE_M_S: f64 = 0.15;
@@ -16,7 +16,10 @@ const MIN_RATE_M_S: f64 = 0.15;
 const BRAKES_M_S2: f64 = 9.81;
 /// Watchdog of the drives, and longest age of a force; with two periods \[s\].
 const MAX_AGE_S: f64 = 0.022;
-const MOVE: &str = "move --config m.toml --motion sines --seconds 60 --engage";
+/// `drive_enabled` of six enabled drives.
+const ALL_DRIVES: u32 = 0x3f;
+/// Allowance for the acceleration of the motion \[m\].
+const TOLERANCE_M: f64 = 1.5e-3;
 
 /// Failures: process, signal, and the state of the drives that follows.
 const ROWS: [(&str, i32, &str); 4] = [
@@ -28,10 +31,12 @@ const ROWS: [(&str, i32, &str); 4] = [
 
 /// The next measurement of the driver.
 fn next(measured: &mut Subscriber<MeasuredMessage>) -> MeasuredMessage {
+    let began = Instant::now();
     loop {
         if let Some(message) = measured.receive_latest() {
             return message;
         }
+        assert!(began.elapsed() < Duration::from_secs(60), "the driver publishes nothing");
         sleep(Duration::from_micros(200));
     }
 }
@@ -41,23 +46,39 @@ fn difference_m(a: &MeasuredMessage, b: &MeasuredMessage) -> f64 {
     a.length_m.iter().zip(b.length_m).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Sends a signal in fast motion; the last measurement before, and the rate of the fastest leg \[m/s\].
+/// Sends a signal in fast motion; the last measurement before, and the rate of the fastest leg \[m/s\]. `None` if the drives stop
+/// without it.
 fn signal_in_motion(
     network: &mut Network,
     measured: &mut Subscriber<MeasuredMessage>,
     (process, signal): (&str, i32),
-) -> (MeasuredMessage, f64) {
+) -> Option<(MeasuredMessage, f64)> {
+    network.start("move", network.hexad("move --config m.toml --motion sines --seconds 60 --engage"));
+    network.wait_for("move", "in control: moving", 1);
+    sleep(Duration::from_secs(2));
     let mut before = next(measured);
-    loop {
+    while before.drive_enabled == ALL_DRIVES {
         let now = next(measured);
         let interval_s = now.header.time_ns.saturating_sub(before.header.time_ns) as f64 * 1e-9;
         let rate_m_s = difference_m(&now, &before) / interval_s;
         if rate_m_s > MIN_RATE_M_S && interval_s < 0.01 {
             network.signal(process, signal);
-            return (now, rate_m_s);
+            return Some((now, rate_m_s));
         }
         before = now;
     }
+    None
+}
+
+/// The platform stands at home again, ready for a motion; again if the host delays frames meanwhile.
+fn recover(network: &mut Network) {
+    network.signal("move", libc::SIGKILL);
+    let is_home = |network: &Network| {
+        network.output(network.hexad("clear --config m.toml"));
+        sleep(Duration::from_secs(1));
+        network.hexad("goto --config m.toml --home --engage").output().unwrap().status.success()
+    };
+    assert!((0..3).any(|_| is_home(network)), "{}", network.ends());
 }
 
 #[test]
@@ -69,13 +90,21 @@ fn processes_that_are_killed_or_stopped_in_motion() {
     network.wait_for("run", "six drives in OP", 1);
     let mut measured = Bus::join(network.machine()).unwrap().subscriber(8).unwrap();
     for (process, signal, state) in ROWS {
-        network.start("move", network.hexad(MOVE));
-        network.wait_for("move", "in control: moving", 1);
-        sleep(Duration::from_secs(2));
         let count = |network: &Network, text: &str| network.log("simulate").matches(text).count();
-        let stops = count(&network, state);
         let watchdog = Watchdog::start();
-        let (before, rate_m_s) = signal_in_motion(&mut network, &mut measured, (process, signal));
+        let mut stops = count(&network, state);
+        let mut signalled = signal_in_motion(&mut network, &mut measured, (process, signal));
+        for _ in 0..2 {
+            if signalled.is_none() {
+                recover(&mut network);
+                stops = count(&network, state);
+                signalled = signal_in_motion(&mut network, &mut measured, (process, signal));
+            }
+        }
+        let Some((before, rate_m_s)) = signalled else {
+            assert!(network.log("run").contains("lost_frames=3"), "{}", network.ends());
+            return not_run::not_run("the host delays the frames of a loop of 1 kHz, three times in a row");
+        };
         let delay_s = monotonic_ns().saturating_sub(before.header.time_ns) as f64 * 1e-9;
         network.wait_for("simulate", state, stops + 6);
         let pause_s = watchdog.largest().as_secs_f64();
@@ -83,7 +112,10 @@ fn processes_that_are_killed_or_stopped_in_motion() {
         // A process that continues, or is started again, does not move the platform: an operator has to engage it.
         match (process, signal) {
             (_, libc::SIGSTOP) => network.signal(process, libc::SIGCONT),
-            ("run", _) => network.start("run", network.driver("run d.toml m.toml")),
+            ("run", _) => {
+                network.start("run", network.driver("run d.toml m.toml"));
+                network.wait_for("run", "leg 6 has the fault 0x7500", 1);
+            }
             _ => network.start("daemon", network.hexad("run m.toml")),
         }
         sleep(Duration::from_secs(2));
@@ -91,7 +123,7 @@ fn processes_that_are_killed_or_stopped_in_motion() {
         // What the host took away counts as if the leg had gone on.
         let bound_m = rate_m_s * (MAX_AGE_S + delay_s + 2.0 * pause_s)
             + rate_m_s * rate_m_s / (2.0 * BRAKES_M_S2)
-            + 1e-3;
+            + TOLERANCE_M;
         println!(
             "{process}, signal {signal}: {:.1} mm at {rate_m_s:.2} m/s, at most {:.1} mm; delay {:.1} ms, pause {:.1} ms",
             way_m * 1e3,
@@ -99,12 +131,13 @@ fn processes_that_are_killed_or_stopped_in_motion() {
             delay_s * 1e3,
             pause_s * 1e3
         );
-        assert!(way_m < bound_m, "{process}, signal {signal}: {way_m} m, at most {bound_m} m");
+        assert!(
+            way_m < bound_m,
+            "{process}, signal {signal}: {way_m} m, at most {bound_m} m\n{}",
+            network.ends()
+        );
         assert_eq!(count(&network, "drive=OperationEnabled"), enabled, "{process}, signal {signal}");
-        network.signal("move", libc::SIGKILL);
-        network.output(network.hexad("clear --config m.toml"));
-        sleep(Duration::from_secs(1));
-        network.output(network.hexad("goto --config m.toml --home --engage"));
+        recover(&mut network);
     }
     network.signal("run", libc::SIGINT);
     network.wait_for("run", "the driver ends", 1);

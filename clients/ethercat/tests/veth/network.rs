@@ -70,10 +70,14 @@ impl Network {
 
     /// Starts a process whose output is the file `name`.
     pub fn start(&mut self, name: &'static str, mut command: Command) {
+        // One with this name that was killed leaves a process that has not been waited for.
+        for (_, mut child) in self.processes.extract_if(.., |(started, _)| *started == name) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
         let log = File::create(self.path(name)).unwrap();
         let child =
             command.stdout(log.try_clone().unwrap()).stderr(log).stdin(Stdio::null()).spawn().unwrap();
-        self.processes.retain(|(started, _)| *started != name);
         self.processes.push((name, child));
     }
 
