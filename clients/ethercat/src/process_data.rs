@@ -47,6 +47,7 @@ pub struct ProcessData {
     pub lost_in_row: u32,
     /// The same since the start.
     pub lost_frames: u64,
+    max_lost_frames: u32,
     position_of_leg: [usize; LEGS],
     period_ns: u64,
     shift_ns: u64,
@@ -63,6 +64,7 @@ impl ProcessData {
             states: [SubDeviceState::Op; LEGS],
             lost_in_row: 0,
             lost_frames: 0,
+            max_lost_frames: file.bus.lost_frames,
             position_of_leg: file.legs.each_ref().map(|leg| leg.position - 1),
             period_ns: u64::from(file.bus.period_us) * 1000,
             shift_ns: u64::from(file.bus.shift_us) * 1000,
@@ -84,7 +86,9 @@ impl ProcessData {
         match self.next_exchange(bus, devices) {
             Exchange::Complete | Exchange::Early => {}
             Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
-            Exchange::Lost if self.lost_in_row > 2 => return Err("frames do not come back".into()),
+            Exchange::Lost if self.lost_in_row >= self.max_lost_frames => {
+                return Err("frames do not come back".into());
+            }
             Exchange::Lost => return Ok(false),
         }
         match (1..=LEGS).zip(&self.drives).find(|(_, drive)| drive.state().is_fault()) {

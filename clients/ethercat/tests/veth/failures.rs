@@ -107,6 +107,9 @@ fn processes_that_are_killed_or_stopped_in_motion() {
         };
         let delay_s = monotonic_ns().saturating_sub(before.header.time_ns) as f64 * 1e-9;
         network.wait_for("simulate", state, stops + 6);
+        if process == "run" {
+            network.wait_for("daemon", "code=101", 1);
+        }
         let pause_s = watchdog.largest().as_secs_f64();
         let enabled = count(&network, "drive=OperationEnabled");
         // A process that continues, or is started again, does not move the platform: an operator has to engage it.

@@ -87,6 +87,12 @@ impl Network {
         child.try_wait().unwrap().is_none()
     }
 
+    /// Waits for the end of a process.
+    pub fn exit_code(&mut self, name: &str) -> Option<i32> {
+        let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
+        child.wait().unwrap().code()
+    }
+
     /// Sends a signal to a process.
     pub fn signal(&mut self, name: &str, signal: i32) {
         let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
