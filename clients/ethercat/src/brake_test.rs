@@ -84,12 +84,12 @@ fn test_leg<L: Link>(
     let began_ns = bus.wire.link.now_ns();
     let (mut start_m, mut enabled_ns, mut reported_n, mut samples) = (None, None, 0.0, 0.0);
     loop {
-        let Some(drive) = data.drives.get(leg) else { return Ok(()) };
+        let Some(drive) = data.drives.get(leg) else { return Err(format!("there is no leg {number}")) };
         let length_m = drive.length_m().unwrap_or_default();
         let slip_m = (length_m - *start_m.get_or_insert(length_m)).abs();
         if slip_m > max_slip_m {
             return Err(format!(
-                "leg {number}: its closed brake slips by {:.3} mm under {brake_n:.0} N, more than max_slip_m = {} mm: support \
+                "leg {number}: its closed brake slips by {:.3} mm under {brake_n:.0} N, more than {} mm (max_slip_m): support \
                  the platform, then repair the brake, or correct brake_hold if the brake opens",
                 slip_m * 1e3,
                 max_slip_m * 1e3

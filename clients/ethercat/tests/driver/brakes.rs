@@ -82,7 +82,7 @@ fn the_worn_brake_of_each_leg_is_refused() {
         println!("{error}");
         for words in [
             &format!("leg {}: its closed brake slips by 0.5", leg + 1),
-            &format!("under {:.0} N, more than max_slip_m = 0.5 mm: support the platform", loads[leg]),
+            &format!("under {:.0} N, more than 0.5 mm (max_slip_m): support the platform", loads[leg]),
         ] {
             assert!(error.contains(words), "{words:?} is not in {error:?}");
         }
