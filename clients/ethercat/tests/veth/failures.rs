@@ -102,15 +102,14 @@ fn processes_that_are_killed_or_stopped_in_motion() {
     for (process, signal, state) in ROWS {
         let count = |network: &Network, text: &str| network.log("simulate").matches(text).count();
         let watchdog = Watchdog::start();
-        let mut stops = count(&network, state);
-        let mut signalled = signal_in_motion(&mut network, &mut measured, (process, signal));
-        for _ in 0..2 {
-            if signalled.is_none() {
+        let mut stops = 0;
+        let signalled = (0..3).find_map(|attempt| {
+            if attempt > 0 {
                 recover(&mut network);
-                stops = count(&network, state);
-                signalled = signal_in_motion(&mut network, &mut measured, (process, signal));
             }
-        }
+            stops = count(&network, state);
+            signal_in_motion(&mut network, &mut measured, (process, signal))
+        });
         let Some((before, rate_m_s)) = signalled else {
             let pause = watchdog.largest();
             let is_host = network.log("run").contains("lost_frames=10") || pause > Duration::from_millis(1);
