@@ -47,6 +47,11 @@ fn difference_m(a: &MeasuredMessage, b: &MeasuredMessage) -> f64 {
     a.length_m.iter().zip(b.length_m).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
+/// Largest way of a leg after a failure \[m\]. Time that the host took away counts as if the leg had gone on.
+fn bound_m(rate_m_s: f64, host_s: f64) -> f64 {
+    rate_m_s * (MAX_AGE_S + host_s) + rate_m_s * rate_m_s / (2.0 * BRAKES_M_S2) + TOLERANCE_M
+}
+
 /// Sends a signal in fast motion; the last measurement before, and the rate of the fastest leg \[m/s\]. `None` if control
 /// ends without it.
 fn signal_in_motion(
@@ -134,10 +139,7 @@ fn processes_that_are_killed_or_stopped_in_motion() {
         }
         sleep(Duration::from_secs(2));
         let way_m = difference_m(&next(&mut measured), &before);
-        // What the host took away counts as if the leg had gone on.
-        let bound_m = rate_m_s * (MAX_AGE_S + delay_s + 2.0 * pause_s)
-            + rate_m_s * rate_m_s / (2.0 * BRAKES_M_S2)
-            + TOLERANCE_M;
+        let bound_m = bound_m(rate_m_s, delay_s + 2.0 * pause_s);
         println!(
             "{process}, signal {signal}: {:.1} mm at {rate_m_s:.2} m/s, at most {:.1} mm; delay {:.1} ms, pause {:.1} ms",
             way_m * 1e3,
