@@ -53,6 +53,11 @@ impl Hardware {
         });
     }
 
+    /// Legs slip through their closed brakes; see [`Simulator::slip`].
+    pub fn slip(&mut self, duration_ns: u64, rates: &[f64; LEGS]) {
+        self.simulator.slip(duration_ns as f64 * 1e-9, rates);
+    }
+
     /// Lengths \[m\] and rates \[m/s\] as the sensors measure them now. Each reading draws its own noise.
     pub fn measure(&mut self) -> ([f64; LEGS], [f64; LEGS]) {
         let legs = self.simulator.leg_motion();

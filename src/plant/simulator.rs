@@ -178,6 +178,18 @@ impl Simulator {
         }
     }
 
+    /// Legs slip through their closed brakes at these rates \[m/s\] for `duration` seconds, as worn brakes let them.
+    pub fn slip(&mut self, duration: f64, rates: &[f64; LEGS]) {
+        if self.brakes != Brakes::Closed {
+            return;
+        }
+        let before = self.state().pose;
+        let twist = twist_from_rates(self.machine(), &before, rates).unwrap_or_default();
+        let pose =
+            before.displaced(&Twist { angular: twist.angular * duration, linear: twist.linear * duration });
+        self.carry_drives(BodyState { pose, twist: Twist::default() });
+    }
+
     fn drive(&mut self, force: &[f64; LEGS], step: f64) {
         let Self { dynamics, terms, state, push, time, .. } = &*self;
         let accelerations = |state: &PlantState, dt: f64| {

@@ -81,6 +81,10 @@ pub struct LegSection {
     pub brake: Brake,
     /// Objects to be written at the start.
     pub sdo: Vec<SdoWrite>,
+    /// Objects that are written after these for the test of the brake: they keep it closed while operation is enabled.
+    pub brake_hold: Vec<SdoWrite>,
+    /// Largest motion of the closed brake under its test load.
+    pub max_slip_m: f64,
     /// Object that maps the outputs; the driver writes the mapping.
     pub rx_pdo: u16,
     /// Object that maps the inputs.
@@ -128,6 +132,8 @@ const LEG_DEFAULTS: &str = "
 gear = 1.0
 efficiency = 1.0
 sdo = []
+brake_hold = []
+max_slip_m = 0.0005
 rx_pdo = 0x1600
 tx_pdo = 0x1a00
 ";
@@ -193,6 +199,20 @@ impl DrivesFile {
             .collect()
     }
 
+    /// Legs whose brake is not tested, in words.
+    pub fn untested_brakes(&self) -> Option<String> {
+        let untested = (1..).zip(&self.legs).filter(|(_, leg)| leg.brake_hold.is_empty());
+        let numbers: Vec<_> = untested.map(|(number, _): (u32, _)| number.to_string()).collect();
+        (!numbers.is_empty())
+            .then(|| format!("the brakes of legs {} are not tested: no brake_hold", numbers.join(", ")))
+    }
+
+    /// The same drives, with brakes that stay closed while operation is enabled.
+    pub fn with_brakes_held(mut self) -> Self {
+        self.legs.iter_mut().for_each(|leg| leg.sdo.extend(&leg.brake_hold));
+        self
+    }
+
     /// Legs, counted from 0, in the order of their drives on the bus.
     pub fn by_position(&self) -> [(usize, &LegSection); LEGS] {
         let mut next = 0..;
@@ -251,14 +271,24 @@ impl LegSection {
                 ("offset_m", self.offset_m, -1e4, 1e4),
                 ("rated_torque_n_m", self.rated_torque_n_m, 1e-3, 1e4),
                 ("max_torque_permille", self.max_torque_permille.into(), 1.0, 30_000.0),
+                ("max_slip_m", self.max_slip_m, 1e-5, 5e-3),
                 brake,
             ],
         );
         if self.sign.abs() != 1 {
             errors.push(format!("sign = {}: must be 1 or -1", self.sign));
         }
-        for write in self.sdo.iter().filter(|write| !matches!(write.bytes, 1 | 2 | 4)) {
+        let writes = self.sdo.iter().chain(&self.brake_hold);
+        for write in writes.filter(|write| !matches!(write.bytes, 1 | 2 | 4)) {
             errors.push(format!("sdo {:#06x}: bytes = {}: must be 1, 2 or 4", write.index, write.bytes));
+        }
+        let is_restored = |held: &&SdoWrite| {
+            self.sdo.iter().any(|write| (write.index, write.sub) == (held.index, held.sub))
+        };
+        for SdoWrite { index, sub, .. } in self.brake_hold.iter().filter(|held| !is_restored(held)) {
+            errors.push(format!(
+                "brake_hold {index:#06x}:{sub}: sdo must contain the object with its value for operation"
+            ));
         }
         errors
     }

@@ -1,19 +1,15 @@
 //! Motion of one leg by a small torque, to see which way it goes. The other drives stay without power and their brakes closed.
 
-use hexad::model::LEGS;
-
 use crate::bus::Bus;
 use crate::cia402::Goal;
 use crate::link::Link;
-use crate::process_data::{Exchange, ProcessData};
+use crate::process_data::ProcessData;
 use crate::startup::OpDevices;
 
 /// The motion ends after this way \[m\].
 pub const MAX_WAY_M: f64 = 0.002;
 /// Cycles within which the drive must be enabled and its brake open.
 const MAX_READY_CYCLES: u64 = 3000;
-/// Cycles without power at the end.
-const END_CYCLES: u64 = 100;
 
 /// Result of a jog.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,19 +33,8 @@ pub fn jog<L: Link>(
     let mut push = || {
         let (mut start_m, mut way_m, mut pushed, mut waited) = (None, 0.0f64, 0, 0);
         while pushed < cycles && way_m.abs() < MAX_WAY_M && !is_stopped() {
-            match data.next_exchange(bus, devices) {
-                Exchange::Complete | Exchange::Early => {}
-                Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
-                Exchange::Lost if data.lost_in_row > 2 => return Err("frames do not come back".into()),
-                Exchange::Lost => continue,
-            }
-            for (number, drive) in (1..=LEGS).zip(&data.drives) {
-                if drive.state().is_fault() {
-                    return Err(format!(
-                        "leg {number} has the fault {:#06x}: reset it",
-                        drive.inputs().error_code
-                    ));
-                }
+            if !data.next_inputs(bus, devices)? {
+                continue;
             }
             let Some(drive) = data.drives.get(leg) else {
                 return Err(format!("there is no leg {}", leg + 1));
@@ -65,23 +50,13 @@ pub fn jog<L: Link>(
             if waited > MAX_READY_CYCLES {
                 return Err(format!("the drive is not ready: {:?}, brake closed", drive.state()));
             }
-            command(data, leg, Goal::Enabled, if is_ready { force_n } else { 0.0 });
+            data.command_one(leg, Goal::Enabled, if is_ready { force_n } else { 0.0 });
         }
         Ok(way_m)
     };
     let outcome: Result<f64, String> = push();
-    for _ in 0..END_CYCLES {
-        command(data, leg, Goal::Disabled, 0.0);
-        data.next_exchange(bus, devices);
-    }
+    data.switch_off(bus, devices);
     let way_m = outcome?;
     let is_direction_right = way_m * force_n > 0.0;
     Ok(Jog { way_m, is_direction_right })
-}
-
-fn command(data: &mut ProcessData, leg: usize, goal: Goal, force_n: f64) {
-    for (index, (drive, outputs)) in data.drives.iter_mut().zip(&mut data.outputs).enumerate() {
-        let (goal, force_n) = if index == leg { (goal, force_n) } else { (Goal::Disabled, 0.0) };
-        *outputs = drive.command(goal, force_n);
-    }
 }

@@ -26,6 +26,8 @@ pub const RATED_TORQUE: u16 = 0x6076;
 pub const ACTUAL_TORQUE: u16 = 0x6077;
 /// Digital inputs.
 pub const DIGITAL_INPUTS: u16 = 0x60fd;
+/// Digital outputs: subindex 1 their values, 2 the mask of those that the main device sets. Bit 0 sets the brake.
+pub const DIGITAL_OUTPUTS: u16 = 0x60fe;
 /// Modes that the drive has.
 pub const SUPPORTED_MODES: u16 = 0x6502;
 /// Increments of the encoder, and the revolutions of the motor for them.

@@ -4,6 +4,7 @@ use ethercrab::SubDeviceState;
 use hexad::model::LEGS;
 
 use crate::bus::Bus;
+use crate::cia402::Goal;
 use crate::drives_file::DrivesFile;
 use crate::leg_drive::LegDrive;
 use crate::link::Link;
@@ -13,6 +14,8 @@ use crate::sync_clock::SyncClock;
 
 /// A drive adds one to the working counter for its inputs and two for its outputs.
 const WORKING_COUNTER: u16 = 3 * LEGS as u16;
+/// Cycles that close the brakes.
+const OFF_CYCLES: u64 = 100;
 
 /// Result of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +47,7 @@ pub struct ProcessData {
     pub lost_in_row: u32,
     /// The same since the start.
     pub lost_frames: u64,
+    max_lost_frames: u32,
     position_of_leg: [usize; LEGS],
     period_ns: u64,
     shift_ns: u64,
@@ -60,6 +64,7 @@ impl ProcessData {
             states: [SubDeviceState::Op; LEGS],
             lost_in_row: 0,
             lost_frames: 0,
+            max_lost_frames: file.bus.lost_frames,
             position_of_leg: file.legs.each_ref().map(|leg| leg.position - 1),
             period_ns: u64::from(file.bus.period_us) * 1000,
             shift_ns: u64::from(file.bus.shift_us) * 1000,
@@ -74,6 +79,40 @@ impl ProcessData {
         self.clock.advance_to(link.now_ns());
         link.sleep_until(self.clock.sync0_ns() + self.shift_ns);
         self.exchange(bus, devices, self.clock.sync0_ns() + self.period_ns / 2)
+    }
+
+    /// The next exchange, and whether its frame has come back. Errors are in words: a drive is missing or has a fault.
+    pub fn next_inputs<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices) -> Result<bool, String> {
+        match self.next_exchange(bus, devices) {
+            Exchange::Complete | Exchange::Early => {}
+            Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
+            Exchange::Lost if self.lost_in_row >= self.max_lost_frames => {
+                return Err("frames do not come back".into());
+            }
+            Exchange::Lost => return Ok(false),
+        }
+        match (1..=LEGS).zip(&self.drives).find(|(_, drive)| drive.state().is_fault()) {
+            Some((leg, drive)) => {
+                Err(format!("leg {leg} has the fault {:#06x}: reset it", drive.inputs().error_code))
+            }
+            None => Ok(true),
+        }
+    }
+
+    /// Commands the drive of one leg, from 0. The others have no power.
+    pub fn command_one(&mut self, leg: usize, goal: Goal, force_n: f64) {
+        for (index, (drive, outputs)) in self.drives.iter_mut().zip(&mut self.outputs).enumerate() {
+            let (goal, force_n) = if index == leg { (goal, force_n) } else { (Goal::Disabled, 0.0) };
+            *outputs = drive.command(goal, force_n);
+        }
+    }
+
+    /// Takes the power off all drives, and waits for their brakes.
+    pub fn switch_off<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices) {
+        for _ in 0..OFF_CYCLES {
+            self.command_one(LEGS, Goal::Disabled, 0.0);
+            self.next_exchange(bus, devices);
+        }
     }
 
     /// Sends the outputs, receives the inputs. A frame that has not come back at an instant \[ns\] is lost.

@@ -41,10 +41,13 @@ impl Engagement {
         Ok(Self::InStep { commands: bus.publisher()?, began_ns: None, within, sent: None })
     }
 
-    /// Control has begun; if it ends, the time in step with the setpoints begins again.
+    /// Control has begun; if it ends, the time in step with the setpoints begins again. A request over the socket that was not
+    /// necessary is not sent later: the daemon may have been restarted, and an operator must engage.
     pub fn has_succeeded(&mut self) {
-        if let Self::InStep { began_ns, .. } = self {
-            *began_ns = None;
+        match self {
+            Self::InStep { began_ns, .. } => *began_ns = None,
+            Self::Socket { result: None, .. } => *self = Self::None,
+            Self::None | Self::Socket { .. } => {}
         }
     }
 

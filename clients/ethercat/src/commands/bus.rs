@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use hexad::config::Config;
 use hexad::realtime::stop_request::Stop;
 use hexad_ethercat::bus::{Bus, Frames};
 use hexad_ethercat::cia402::Goal;
@@ -10,7 +11,11 @@ use hexad_ethercat::drives_file::{DrivesFile, LegSection, SdoWrite};
 use hexad_ethercat::process_data::{Exchange, ProcessData};
 use hexad_ethercat::raw_socket::RawSocket;
 use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
-use hexad_ethercat::{file_edit, inventory, jog as jogging, machine_check, objects, scan as scanning};
+use hexad_ethercat::{
+    brake_test, file_edit, inventory, jog as jogging, machine_check, objects, scan as scanning,
+};
+
+use tracing::warn;
 
 use super::{Failure, after_start, before_start, load_drives, load_machine, load_text, none_of, open};
 
@@ -40,6 +45,7 @@ pub fn check(drives: &Path, machine: Option<&Path>, is_offline: bool) -> Result<
     }
     none_of(errors)?;
     println!("{}: no error", drives.display());
+    file.untested_brakes().into_iter().for_each(|text| println!("{text}"));
     Ok(())
 }
 
@@ -64,6 +70,34 @@ pub(super) fn operational<'f>(
     none_of(inventory::contradictions(&mut bus, &devices, file))?;
     let (devices, clock) = startup::bring_up(&mut bus, devices, file).map_err(before_start)?;
     Ok((bus, devices, ProcessData::new(file, middle_m, clock)))
+}
+
+/// Tests the brakes of legs with `brake_hold`. The inner error: a brake does not hold.
+pub(super) fn test_brakes(
+    file: &DrivesFile,
+    machine: &Config,
+    stop: &Stop,
+) -> Result<Result<(), String>, Failure> {
+    file.untested_brakes().into_iter().for_each(|text| warn!("{text}"));
+    if file.legs.iter().all(|leg| leg.brake_hold.is_empty()) {
+        return Ok(Ok(()));
+    }
+    let frames = Frames::new();
+    let machine = &machine.machine;
+    let middle_m = machine.actuator.min_length.midpoint(machine.actuator.max_length);
+    let (mut bus, devices, mut data) = operational(&frames, &file.clone().with_brakes_held(), middle_m)?;
+    let outcome = brake_test::test(&mut bus, &devices, &mut data, file, machine, || stop.is_requested());
+    leave(bus, devices);
+    Ok(outcome)
+}
+
+pub fn brakes(drives: &Path, machine: &Path) -> Result<(), Failure> {
+    let (file, machine) = (load_drives(drives)?, load_machine(machine)?);
+    none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
+    let stop = Stop::on_signals().map_err(before_start)?;
+    test_brakes(&file, &machine, &stop)?.map_err(after_start)?;
+    println!("{}", if stop.is_requested() { "the test was stopped" } else { "the tested brakes hold" });
+    Ok(())
 }
 
 pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: bool) -> Result<(), Failure> {

@@ -43,6 +43,13 @@ enum CommandArguments {
         #[arg(long)]
         offline: bool,
     },
+    /// Load each closed brake with 1.1 times its load, as `run` does at its start
+    Brakes {
+        /// Drives file
+        drives: PathBuf,
+        /// Machine file
+        machine: PathBuf,
+    },
     /// Drive the machine until SIGINT or SIGTERM
     Run {
         /// Drives file
@@ -62,6 +69,9 @@ enum CommandArguments {
         /// Legs that are not coupled to the platform, to try jog
         #[arg(long)]
         uncoupled: bool,
+        /// Force above which the closed brakes slip
+        #[arg(long, value_name = "N", default_value_t = f64::INFINITY)]
+        brake_n: f64,
     },
     /// Move one leg that is unloaded or uncoupled, to see its direction; it ends after 2 mm
     Jog {
@@ -142,9 +152,10 @@ impl CommandLine {
         match self.command {
             Is::Scan { interface, name } => bus::scan(&interface, &name),
             Is::Check { drives, machine, offline } => bus::check(&drives, machine.as_deref(), offline),
+            Is::Brakes { drives, machine } => bus::brakes(&drives, &machine),
             Is::Run { drives, machine } => run::run(&drives, &machine),
-            Is::Simulate { drives, machine, interface, uncoupled } => {
-                simulate::simulate(&drives, &machine, &interface, uncoupled)
+            Is::Simulate { drives, machine, interface, uncoupled, brake_n } => {
+                simulate::simulate(&drives, &machine, &interface, uncoupled, brake_n)
             }
             Is::Jog { drives, leg, permille, seconds, unloaded } => {
                 bus::jog(&drives, leg, permille, seconds, unloaded)

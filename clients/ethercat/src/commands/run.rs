@@ -12,7 +12,7 @@ use hexad_ethercat::process_data::Exchange;
 use hexad_ethercat::topics::Topics;
 use tracing::{info, warn};
 
-use super::bus::{leave, operational};
+use super::bus::{leave, operational, test_brakes};
 use super::{Failure, after_start, before_start, load_drives, load_machine, none_of};
 
 /// Below the daemon's priorities, 80 and 79.
@@ -32,6 +32,7 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
     report(memory::lock_all());
     scheduling::set_shortest_timer_slack();
     report(scheduling::fifo_priority(PRIORITY));
+    test_brakes(&file, &machine, &stop)?.map_err(before_start)?;
     let frames = Frames::new();
     let actuator = &machine.machine.actuator;
     let middle_m = actuator.min_length.midpoint(actuator.max_length);

@@ -18,7 +18,13 @@ const PRIORITY: i32 = 75;
 /// Longest time without simulation \[ns\].
 const MAX_WAIT_NS: u64 = 500_000;
 
-pub fn simulate(drives: &Path, machine: &Path, interface: &str, is_uncoupled: bool) -> Result<(), Failure> {
+pub fn simulate(
+    drives: &Path,
+    machine: &Path,
+    interface: &str,
+    is_uncoupled: bool,
+    brake_n: f64,
+) -> Result<(), Failure> {
     let (file, machine) = (load_drives(drives)?, load_machine(machine)?);
     let stop = Stop::on_signals().map_err(before_start)?;
     let mut socket = RawSocket::open(interface).map_err(before_start)?;
@@ -33,6 +39,7 @@ pub fn simulate(drives: &Path, machine: &Path, interface: &str, is_uncoupled: bo
     } else {
         simulation::segment(&file, &machine, socket.now_ns())
     };
+    segment.devices.iter_mut().for_each(|device| device.brake_n = brake_n);
     info!(name = %machine.name, interface, "six simulated drives are switched on");
     let mut buffer = [0; MAX_FRAME];
     let mut shown = segment.devices.each_ref().map(state);

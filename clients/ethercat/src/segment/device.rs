@@ -3,6 +3,7 @@
 
 use super::application_layer::al_state::{INIT, OP, SAFE_OP};
 use super::local_clock::LocalClock;
+use super::mechanics::LegForce;
 use super::object_dictionary::{MappedObject, ObjectDictionary};
 use super::servo_drive::{DriveCommand, ServoDrive};
 use super::sii::{self, Identity};
@@ -39,6 +40,8 @@ pub struct Device {
     pub refusal: Option<(u8, u16)>,
     /// The encoder counts against the direction of the torque.
     pub is_encoder_reversed: bool,
+    /// Force above which the closed brake slips \[N\].
+    pub brake_n: f64,
     /// The watchdog cannot be set.
     pub is_watchdog_fixed: bool,
     /// Error code of an emergency that the device is about to send: before its response to the next request, or at once in OP.
@@ -74,6 +77,7 @@ impl Device {
             objects: ObjectDictionary::new(&model),
             refusal: None,
             is_encoder_reversed: false,
+            brake_n: f64::INFINITY,
             is_watchdog_fixed: false,
             emergency: None,
             memory,
@@ -266,11 +270,13 @@ impl Device {
             let (start, length, _) = self.sync_manager(2);
             self.objects.load(&self.outputs, &self.memory[start..(start + length).min(MEMORY)]);
         }
+        let outputs = |sub| self.objects.value((objects::DIGITAL_OUTPUTS, sub));
         let command = DriveCommand {
             control_word: if is_op { self.objects.get(objects::CONTROL_WORD) as u16 } else { 0 },
             mode: self.objects.get(objects::MODE) as i8,
             target_torque: self.objects.get(objects::TARGET_TORQUE) as i16,
             max_torque: self.objects.get(objects::MAX_TORQUE) as u16,
+            is_brake_set: outputs(1) & outputs(2) & 1 == 1,
         };
         self.drive.cycle(now_ns, command);
         self.latch_inputs(length_m);
@@ -299,9 +305,11 @@ impl Device {
         }
     }
 
-    /// Force of the drive on its leg \[N\]; `None` with the brake closed.
-    pub fn force_n(&self) -> Option<f64> {
-        let force_n = f64::from(self.drive.torque) * self.model.units.newtons_per_permille();
-        self.drive.is_brake_open.then_some(force_n)
+    /// Force of the drive on its leg \[N\], and the largest of its brake.
+    pub fn leg_force(&self) -> LegForce {
+        LegForce {
+            drive_n: f64::from(self.drive.torque) * self.model.units.newtons_per_permille(),
+            brake_n: if self.drive.is_brake_open { 0.0 } else { self.brake_n },
+        }
     }
 }

@@ -17,7 +17,7 @@ pub mod sii;
 use hexad::model::LEGS;
 
 use self::device::{Device, DeviceModel};
-use self::mechanics::Mechanics;
+use self::mechanics::{LegForce, Mechanics};
 
 /// Ethernet header, then the header of EtherCAT.
 const FIRST_DATAGRAM: usize = 16;
@@ -89,9 +89,9 @@ impl Segment {
     }
 
     fn advance_mechanics(&mut self, until_ns: u64) {
-        let mut forces = [None; LEGS];
+        let mut forces = [LegForce::default(); LEGS];
         for (device, leg) in self.devices.iter().zip(self.leg_of_device) {
-            forces[leg] = device.force_n();
+            forces[leg] = device.leg_force();
         }
         self.mechanics.advance(until_ns.saturating_sub(self.now_ns), &forces);
         self.now_ns = self.now_ns.max(until_ns);

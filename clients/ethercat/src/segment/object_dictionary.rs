@@ -74,6 +74,8 @@ impl ObjectDictionary {
             (objects::MODE, 0, 0, 1),
             (objects::TARGET_TORQUE, 0, 0, 2),
             (objects::MAX_TORQUE, 0, model.max_torque_permille.into(), 2),
+            (objects::DIGITAL_OUTPUTS, 1, 0, 4),
+            (objects::DIGITAL_OUTPUTS, 2, 0, 4),
             // Reaction to the quick stop; interpolation time; synchronization of outputs and inputs.
             (0x605a, 0, 2, 2),
             (0x60c2, 1, 1, 1),
@@ -92,7 +94,8 @@ impl ObjectDictionary {
         self.value((index, 0))
     }
 
-    fn value(&self, key: (u16, u8)) -> u64 {
+    /// Value of an object by index and subindex; 0 if there is none.
+    pub fn value(&self, key: (u16, u8)) -> u64 {
         self.0.get(&key).map_or(0, |object| object.value)
     }
 

@@ -22,6 +22,8 @@ pub struct DriveCommand {
     pub target_torque: i16,
     /// 0x6072
     pub max_torque: u16,
+    /// 0x60fe: the brake stays closed.
+    pub is_brake_set: bool,
 }
 
 /// State of one drive.
@@ -65,7 +67,7 @@ impl ServoDrive {
 
     /// One cycle of the firmware.
     pub fn cycle(&mut self, now_ns: u64, command: DriveCommand) {
-        let DriveCommand { control_word: word, mode, target_torque, max_torque } = command;
+        let DriveCommand { control_word: word, mode, target_torque, max_torque, is_brake_set } = command;
         let is_reset_edge = word & !self.last_word & 0x80 != 0;
         self.last_word = word;
         let mut next = commanded_state(self.state, word, is_reset_edge);
@@ -80,7 +82,7 @@ impl ServoDrive {
         }
         self.mode = mode;
         let is_enabled = next == DriveState::OperationEnabled;
-        self.is_brake_open = is_enabled && now_ns >= self.entered_ns + BRAKE_OPENING_NS;
+        self.is_brake_open = is_enabled && !is_brake_set && now_ns >= self.entered_ns + BRAKE_OPENING_NS;
         let bound = max_torque.min(i16::MAX as u16) as i16;
         self.torque = if is_enabled && mode == CYCLIC_SYNCHRONOUS_TORQUE {
             target_torque.clamp(-bound, bound)

@@ -30,10 +30,21 @@ pub fn segment() -> Segment {
     simulation::segment(&drives(), &machine(), START_NS)
 }
 
+/// Drives whose brakes can be tested, with the standard object.
+pub fn testable_drives() -> DrivesFile {
+    DrivesFile::parse(&DRIVES.replace("[drive]\n", BRAKE_HOLD), "test").unwrap()
+}
+
+pub const BRAKE_HOLD: &str = "[drive]
+sdo = [{ index = 0x60fe, sub = 1, bytes = 4, value = 0 }, { index = 0x60fe, sub = 2, bytes = 4, value = 0 }]
+brake_hold = [{ index = 0x60fe, sub = 1, bytes = 4, value = 1 }, { index = 0x60fe, sub = 2, bytes = 4, value = 1 }]
+";
+
 pub type TestBus<'f> = Bus<'f, SimulatedLink>;
 
 pub fn bus(frames: &Frames, segment: Segment) -> TestBus<'_> {
-    Bus::new(frames, SimulatedLink::new(segment, START_NS)).unwrap()
+    let now_ns = segment.now_ns();
+    Bus::new(frames, SimulatedLink::new(segment, now_ns)).unwrap()
 }
 
 /// Devices in PRE-OP that agree with the file.

@@ -1,6 +1,7 @@
 //! The commands over a veth pair, with the real daemon and with SOEM. Needs root and `ip`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
+mod failures;
 mod network;
 #[path = "../../../../tests/common/not_run.rs"]
 #[allow(dead_code, reason = "shared with the tests of hexad")]
@@ -18,6 +19,8 @@ use std::{env, fs};
 use clap::Parser;
 use hexad::commands::CommandLine;
 use hexad::commands::log::{self, LogFormat};
+use hexad::config::Config;
+use hexad_ethercat::brake_test::holding_forces;
 use network::{HEXAD_ARGUMENTS, Network};
 use stalls::Watchdog;
 
@@ -100,33 +103,49 @@ fn the_daemon_drives_the_platform_over_the_bus() {
             );
         }
     }
-    // Killed in motion: the watchdogs of the drives close the brakes.
-    let motion = "move --config m.toml --motion sines --seconds 60 --engage";
-    network.start("move", network.hexad(motion));
-    network.wait_for("move", "in control: moving", 1);
-    sleep(Duration::from_secs(2));
-    network.signal("run", libc::SIGKILL);
-    network.wait_for("simulate", "al_status=20 drive=Fault is_brake_open=false", 6);
-    network.wait_for("daemon", "code=101", 1);
-    // The same bus, started again; an operator clears the daemon's fault, and the drives' with it.
-    network.start("run", network.driver("run d.toml m.toml"));
-    network.wait_for("run", "six drives in OP", 1);
-    network.wait_for("run", "leg 6 has the fault 0x7500", 1);
-    network.output(network.hexad("clear --config m.toml"));
-    network.wait_for("run", "faults of drives are acknowledged", 1);
-    network.signal("move", libc::SIGINT);
-    sleep(Duration::from_millis(500));
-    network.output(network.hexad("goto --config m.toml --home --engage"));
-    network.start("move", network.hexad(motion));
-    network.wait_for("move", "in control: moving", 1);
-    sleep(Duration::from_secs(1));
-    // The daemon is killed: the forces expire.
-    let stops = network.log("simulate").matches("drive=QuickStop").count();
-    network.signal("daemon", libc::SIGKILL);
-    network.wait_for("simulate", "drive=QuickStop", stops + 6);
-    network.signal("run", libc::SIGINT);
-    network.wait_for("run", "the driver ends", 1);
-    println!("{}", network.log("run"));
+}
+
+#[test]
+fn brakes_are_tested_at_the_start() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let machine =
+        Config::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/motion_base.toml").as_ref());
+    let machine = machine.unwrap().machine;
+    let load_n = holding_forces(&machine, machine.home_pose()).unwrap().into_iter().fold(0.0, f64::max);
+    let hold = "[drive]
+sdo = [{ index = 0x60fe, sub = 2, bytes = 4, value = 0 }, { index = 0x60fe, sub = 1, bytes = 4, value = 0 }]
+brake_hold = [{ index = 0x60fe, sub = 1, bytes = 4, value = 1 }, { index = 0x60fe, sub = 2, bytes = 4, value = 1 }]
+";
+    for (brake_n, exit_codes, words) in
+        [(1.05 * load_n, [1, 2], "its closed brake slips by"), (1.2 * load_n, [0, 0], "six drives in OP")]
+    {
+        let Some(mut network) = simulated("brakes", &format!(" --brake-n {brake_n}")) else { return };
+        let drives = fs::read_to_string(network.path("d.toml")).unwrap().replace("[drive]\n", hold);
+        let drives = format!("lost_frames = 10\n{drives}");
+        fs::write(network.path("d.toml"), drives).unwrap();
+        for (command, exit_code) in ["brakes", "run"].into_iter().zip(exit_codes) {
+            // Frames that the host delays end the test as well.
+            let is_complete = (0..3).any(|_| {
+                network.start(command, network.driver(&format!("{command} d.toml m.toml")));
+                while network.is_running(command) && !network.log(command).contains("six drives in OP") {
+                    sleep(Duration::from_millis(20));
+                }
+                let log = network.log(command);
+                !log.contains("frames do not come back") && !log.contains("has the fault 0x7500: reset it")
+            });
+            if !is_complete {
+                return not_run::not_run(
+                    "the host delays the frames of a loop of 1 kHz, three times in a row",
+                );
+            }
+            if network.is_running(command) {
+                network.signal(command, libc::SIGINT);
+            }
+            assert_eq!(network.exit_code(command), Some(exit_code), "{}", network.ends());
+        }
+        assert!(network.log("run").contains(words), "{}", network.ends());
+        assert!(!network.log("simulate").contains("is_brake_open=true"), "{}", network.ends());
+    }
 }
 
 #[test]

@@ -70,10 +70,14 @@ impl Network {
 
     /// Starts a process whose output is the file `name`.
     pub fn start(&mut self, name: &'static str, mut command: Command) {
+        // One with this name that was killed leaves a process that has not been waited for.
+        for (_, mut child) in self.processes.extract_if(.., |(started, _)| *started == name) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
         let log = File::create(self.path(name)).unwrap();
         let child =
             command.stdout(log.try_clone().unwrap()).stderr(log).stdin(Stdio::null()).spawn().unwrap();
-        self.processes.retain(|(started, _)| *started != name);
         self.processes.push((name, child));
     }
 
@@ -81,6 +85,12 @@ impl Network {
     pub fn is_running(&mut self, name: &str) -> bool {
         let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
         child.try_wait().unwrap().is_none()
+    }
+
+    /// Waits for the end of a process.
+    pub fn exit_code(&mut self, name: &str) -> Option<i32> {
+        let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
+        child.wait().unwrap().code()
     }
 
     /// Sends a signal to a process.
