@@ -56,15 +56,9 @@ fn send(socket: &UdpSocket, to: &str, began: Instant, seconds: f64, jumps: bool)
 }
 
 /// RMS deviation of the true motion from the flight that was sent, with the lag at which it is least \[m\], \[s\].
-fn deviation(
-    measured: &[MeasuredMessage],
-    home_y: f64,
-    began_ns: u64,
-    [from_ns, to_ns]: [u64; 2],
-) -> [f64; 2] {
+fn deviation(measured: &[MeasuredMessage], began_ns: u64, [from_ns, to_ns]: [u64; 2]) -> [f64; 2] {
     let within = measured.iter().filter(|m| (from_ns..to_ns).contains(&m.header.time_ns));
-    let motion: Vec<_> =
-        within.map(|m| (1e-9 * (m.header.time_ns - began_ns) as f64, m.x[4] - home_y)).collect();
+    let motion: Vec<_> = within.map(|m| (1e-9 * (m.header.time_ns - began_ns) as f64, m.x[4])).collect();
     assert!(motion.len() > 1000, "{} measurements", motion.len());
     let rms = |lag: f64| {
         let squares: f64 = motion.iter().map(|(t, y)| (y - flight(t - lag)[0]).powi(2)).sum();
@@ -74,9 +68,14 @@ fn deviation(
     lags.map(|lag| [rms(lag), lag]).min_by(|a, b| a[0].total_cmp(&b[0])).unwrap()
 }
 
-#[test]
-fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
-    let _turn = turns::beside_others();
+/// What happened in a ride: pauses that the player saw, and largest RMS deviation from the flight \[m\].
+struct Ride {
+    pauses: usize,
+    deviation_m: f64,
+}
+
+/// Boarding, a flight with a pause, jumps, boarding.
+fn ride() -> Ride {
     let machine = Machine::with("udp", block(1));
     let recorder = Recorder::start(&machine.name);
     let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
@@ -93,53 +92,63 @@ fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
     daemon.says("active");
     player.says("waits for datagrams");
     let (began, began_ns) = (Instant::now(), monotonic_ns());
-    let at = |name: &str| {
+    let pose = |when: &str| -> [f64; 6] {
         let answer = status(&machine);
-        assert_eq!(answer["state"], "active", "{name}: {answer}");
-        let pose: [f64; 6] =
-            std::array::from_fn(|k| answer["status"]["pose"][k].as_f64().unwrap_or(f64::NAN));
-        pose
+        assert_eq!(answer["state"], "active", "{when}: {answer}");
+        std::array::from_fn(|k| answer["status"]["pose"][k].as_f64().unwrap_or(f64::NAN))
     };
     send(&socket, &to, began, 1.0, false);
     player.says("follows the stream");
     socket.send_to(b"1;2", &to).unwrap();
     let first = send(&socket, &to, began, 6.0, false);
     let_pass(Duration::from_secs(2));
-    let stood = at("in a pause");
+    let stood = pose("in a pause");
     let_pass(Duration::from_millis(300));
-    assert!((at("in a pause")[4] - stood[4]).abs() < 1e-4, "must stand in a pause");
+    assert!((pose("in a pause")[4] - stood[4]).abs() < 1e-4, "must stand in a pause");
     let second = send(&socket, &to, began, 5.5, false);
     send(&socket, &to, began, 2.0, true);
     player.signal("INT");
     let ended = player.ends_within(HANG);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let ended = ended.stderr;
-    assert!(ended.contains("a pause: the platform stands"), "{ended}");
-    assert!(ended.contains("it has not the numbers of --format"), "{ended}");
-    let boarded = at("at the end");
+    assert!(ended.stderr.contains("it has not the numbers of --format"), "{}", ended.stderr);
+    let boarded = pose("at the end");
     assert!((boarded[3] - 1.08).abs() < 1e-3 && boarded[4].abs() < 1e-3, "{boarded:?}");
     let said = daemon.stops_on("TERM", HANG).stderr;
     assert!(!said.contains("fault") && said.matches("active:").count() == 1, "{said}");
     plant.stops_on("TERM", HANG);
 
     let measured = recorder.finish().measured;
-    for (name, [from_ns, to_ns]) in [("first", first), ("second", second)] {
+    // The jumps are taken at the limit, and no faster.
+    let fastest = fastest(&measured);
+    println!("fastest {fastest:.4} m/s");
+    assert!((0.1..1.02 * 0.12).contains(&fastest), "{fastest} m/s");
+    let deviations = [first, second].map(|[from_ns, to_ns]| {
         // After the blend.
-        let [rms, lag] = deviation(&measured, 0.0, began_ns, [from_ns + 3_500_000_000, to_ns]);
-        println!("{name}: RMS {:.3} mm after a lag of {:.0} ms", 1e3 * rms, 1e3 * lag);
-        assert!(rms < 4e-3, "{name}: {rms} m after {lag} s");
-    }
-    let fastest = measured.windows(11).map(|pair| {
-        let [a, b] = [&pair[0], &pair[10]];
+        let [rms, lag] = deviation(&measured, began_ns, [from_ns + 3_500_000_000, to_ns]);
+        println!("RMS {:.3} mm after a lag of {:.0} ms", 1e3 * rms, 1e3 * lag);
+        rms
+    });
+    let pauses = ended.stderr.matches("a pause: the platform stands").count();
+    Ride { pauses, deviation_m: deviations[0].max(deviations[1]) }
+}
+
+/// Largest velocity of the platform over 10 ms \[m/s\].
+fn fastest(measured: &[MeasuredMessage]) -> f64 {
+    let velocities = measured.windows(11).map(|window| {
+        let [a, b] = [&window[0], &window[10]];
         let way: f64 = (3..6).map(|k| (b.x[k] - a.x[k]).powi(2)).sum();
         way.sqrt() / (1e-9 * (b.header.time_ns - a.header.time_ns) as f64)
     });
-    let fastest = fastest.fold(0.0, f64::max);
-    println!("fastest {fastest:.4} m/s");
-    assert!(
-        (0.1..1.02 * 0.12).contains(&fastest),
-        "the jumps are taken at the limit, and no faster: {fastest} m/s"
-    );
+    velocities.fold(0.0, f64::max)
+}
+
+/// A busy host holds up sender or player for longer than a pause: then the flight is another one, and is repeated.
+#[test]
+fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
+    let _turn = turns::beside_others();
+    let undisturbed = (0..3).map(|_| ride()).find(|ride| ride.pauses == 1);
+    let ride = undisturbed.expect("three rides with a single pause in none of them");
+    assert!(ride.deviation_m < 4e-3, "{} m", ride.deviation_m);
 }
 
 #[test]
