@@ -8,19 +8,21 @@ LOADED.csv has the weight of KG at X, Y, Z on the platform. Prints JSON: number 
 parameters by their names in `hexad identify --json`. The force scales of the machine file are 1.
 """
 
+import csv
 import json
 import sys
 import tomllib
 
 import numpy as np
-from hexad.messages import STATE_ACTIVE, STATE_ENGAGING, STATE_PARKING, STATE_STOPPING
 from mujoco_machine import rotation
 
 # Width of the local polynomials, their samples, samples of an equation, rate below which a leg nearly stands.
 HALF_WIDTH_S, SAMPLES_PER_HALF_WIDTH = 0.02, 4
 GROUP = 16
 STANDING_M_S, STANDING_RATIO = 0.03, 0.2
-LEGS = range(1, 7)
+POSE = [f"estimated_{name}" for name in ("alpha", "beta", "gamma", "x", "y", "z")]
+FORCES = [f"force_{i}" for i in range(1, 7)]
+COLUMNS = ["cycle", "missed_measurements", "t", "estimated_t", *POSE, *FORCES]
 
 
 class Machine:
@@ -66,17 +68,13 @@ class Samples:
 
     def __init__(self, path, delay_s):
         with open(path) as file:
-            names = file.readline().strip().split(",")
-            rows = np.loadtxt(file, delimiter=",")
-        table = dict(zip(names, rows.T))
-        under_control = np.isin(table["state"], [STATE_ENGAGING, STATE_ACTIVE, STATE_STOPPING, STATE_PARKING])
-        rows = np.flatnonzero(under_control)
-        if (np.diff(table["cycle"][rows]) != 1).any() or np.diff(table["missed_measurements"][rows]).any():
+            lines = list(csv.DictReader(file))
+        under_control = [line for line in lines if line["state"] in ("engaging", "active", "stopping", "parking")]
+        table = {name: np.array([float(line[name]) for line in under_control]) for name in COLUMNS}
+        if (np.diff(table["cycle"]) != 1).any() or np.diff(table["missed_measurements"]).any():
             raise ValueError(f"{path}: cycles or measurements are missing")
-        released_ns = table["release_ns"][rows]
-        measured_ns = released_ns - np.rint(table["measured_age_s"][rows] * 1e9)
-        released, measured = (ns * 1e-9 - released_ns[0] * 1e-9 for ns in (released_ns, measured_ns))
-        x, forces = (np.array([table[f"{stem}_{i}"][rows] for i in LEGS]).T for stem in ("x", "force_n"))
+        released, measured = (table[name] - table["t"][0] for name in ("t", "estimated_t"))
+        x, forces = (np.array([table[name] for name in names]).T for names in (POSE, FORCES))
         rotations = np.array([rotation(angles)[0] for angles in x[:, :3]])
         middles = 0.5 * ((released[:-1] + delay_s) + (released[1:] + delay_s))
         half = HALF_WIDTH_S

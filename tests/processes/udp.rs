@@ -168,6 +168,7 @@ fn an_open_address_a_wrong_format_and_an_unfit_file_are_refused() {
         "setpoint.on_violation = \"limit\"",
     );
     refused(&fit, &["--udp", "127.0.0.1:4123"], "needs --format");
+    refused(&fit, &["--udp", "127.0.0.1:4123", "--tool", "tip"], "must go with --trajectory");
     refused(
         &fit,
         &["--udp", "127.0.0.1:4123", "--format", "none"],

@@ -135,6 +135,14 @@ impl MoveArguments {
         if self.source.pause || self.source.resume {
             return Ok(pause::request(&config, self.source.pause)?);
         }
+        if self.source.trajectory.is_none() && !self.frames.is_empty() {
+            return Err(Failure {
+                exit_code: 2,
+                message:
+                    "--tool, --work: must go with --trajectory; other motions are about home of the platform"
+                        .into(),
+            });
+        }
         if let Some(address) = self.source.udp {
             let stop = Stop::on_signals()?;
             return Ok(udp::follow(&config, address, &self.stream, &self.playback, &stop)?);
@@ -143,12 +151,6 @@ impl MoveArguments {
         let trajectory = match (&self.source.trajectory, self.source.motion) {
             (Some(path), _) => {
                 Trajectory::from_file(&config, &coordinates, path, self.group.as_deref(), self.rotation)?
-            }
-            (None, _) if !self.frames.is_empty() => {
-                return Err(Failure {
-                    exit_code: 2,
-                    message: "--tool, --work: must go with --trajectory; the built-in motions are about home of the platform".into(),
-                });
             }
             (None, motion) => {
                 Trajectory::built_in(&config, motion.unwrap_or(BuiltInMotion::Settle), self.seconds)?

@@ -90,6 +90,7 @@ fn the_daemon_drives_the_platform_over_the_bus() {
     network.wait_for("run", "six drives in OP", 1);
     let watchdog = Watchdog::start();
     let seconds = if env::var_os("HEXAD_LONG").is_some() { 300 } else { 3 };
+    let mut resources: Vec<[[usize; 4]; 2]> = vec![];
     for motion in ["sines", "minimum-jerk"] {
         let played = (0..3).any(|_| plays(&mut network, motion, seconds));
         if !played {
@@ -102,6 +103,12 @@ fn the_daemon_drives_the_platform_over_the_bus() {
                 "the host pauses the processes of a loop of 1 kHz too long, three times in a row",
             );
         }
+        resources.push(["daemon", "run"].map(|name| network.resources(name)));
+    }
+    for ([before @ .., kb_before], [after @ .., kb_after]) in resources[0].iter().zip(&resources[1]) {
+        println!("threads, descriptors, shared memory: {before:?}, {after:?}; {kb_before} kB, {kb_after} kB");
+        assert_eq!(before, after, "threads, descriptors, files of shared memory");
+        assert!(kb_after - kb_before.min(kb_after) < 1024, "{kb_before} kB, then {kb_after} kB");
     }
 }
 

@@ -93,6 +93,18 @@ impl Network {
         child.wait().unwrap().code()
     }
 
+    /// Numbers of threads, of open descriptors and of mapped files of shared memory of a process, and its memory \[kB\].
+    pub fn resources(&self, name: &str) -> [usize; 4] {
+        let (_, child) = self.processes.iter().find(|(started, _)| *started == name).unwrap();
+        let folder = PathBuf::from(format!("/proc/{}", child.id()));
+        let count = |name: &str| fs::read_dir(folder.join(name)).unwrap().count();
+        let maps = fs::read_to_string(folder.join("maps")).unwrap();
+        let status = fs::read_to_string(folder.join("status")).unwrap();
+        let memory = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+        let memory_kb = memory.trim().trim_end_matches(" kB").parse().unwrap();
+        [count("task"), count("fd"), maps.matches("/dev/shm/").count(), memory_kb]
+    }
+
     /// Sends a signal to a process.
     pub fn signal(&mut self, name: &str, signal: i32) {
         let (_, child) = self.processes.iter_mut().find(|(started, _)| *started == name).unwrap();
