@@ -53,13 +53,13 @@ impl Earlier {
 }
 
 /// Columns of a table of `hexad convert`.
-fn columns(table: &Path, names: [&str; 4]) -> Vec<[f64; 4]> {
+fn columns(table: &Path, names: [&str; 4]) -> Vec<[String; 4]> {
     let text = fs::read_to_string(table).unwrap();
     let (head, rows) = text.split_once('\n').unwrap();
     let places = names.map(|name| head.split(',').position(|column| column == name).expect(name));
     let row = |line: &str| {
-        let numbers: Vec<&str> = line.split(',').collect();
-        places.map(|place| numbers[place].parse().unwrap())
+        let fields: Vec<&str> = line.split(',').collect();
+        places.map(|place| fields[place].into())
     };
     rows.lines().map(row).collect()
 }
@@ -79,13 +79,14 @@ fn recordings_of_earlier_versions_are_reported_converted_and_recovered() {
         let table = machine.path("table.csv");
         let converted = about(&machine, "convert", &file, &["--csv", &table.display().to_string()]);
         assert_eq!(converted.status.code(), Some(0), "{}", converted.stderr);
-        let rows = columns(&table, ["cycle", "state", "force_n_1", "measured_length_m_1"]);
+        let rows = columns(&table, ["cycle", "state", "force_1", "measured_length_1"]);
         assert_eq!(rows.len(), count);
-        let in_state = |state: State| rows.iter().filter(|row| row[1] == f64::from(state as u32)).count();
+        let in_state = |state: State| rows.iter().filter(|row| row[1] == state.name()).count();
         assert_eq!(State::ALL.map(in_state), earlier.cycles);
         let (cycle, force, length) = earlier.example;
-        let row = rows.iter().find(|row| row[0] == cycle as f64).unwrap();
-        assert_eq!(row[2..], [force, length]);
+        let number = |text: &String| text.parse::<f64>().unwrap();
+        let row = rows.iter().find(|row| number(&row[0]) == cycle as f64).unwrap();
+        assert_eq!([&row[2], &row[3]].map(number), [force, length]);
 
         let recovered = about(&machine, "recover", &file, &[]);
         assert!(recovered.stdout.ends_with(": it is complete\n"), "{}", recovered.stdout);
