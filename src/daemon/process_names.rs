@@ -6,7 +6,14 @@ use crate::control::signals::diagnostic::{Comparison, Diagnostic};
 
 /// Command of a process; empty if it has ended.
 pub fn command(process_id: u32) -> String {
-    fs::read_to_string(format!("/proc/{process_id}/comm")).unwrap_or_default().trim_end().into()
+    let stat = fs::read_to_string(format!("/proc/{process_id}/stat")).unwrap_or_default();
+    let command = || {
+        let (before, state) = stat.rsplit_once(") ")?;
+        let (_, command) = before.split_once('(')?;
+        // A process that has ended is listed until its parent has waited for it.
+        (!state.starts_with('Z')).then(|| command.into())
+    };
+    command().unwrap_or_default()
 }
 
 /// Sentence of a diagnostic, with processes named by command and number.
@@ -31,6 +38,18 @@ pub fn named(process_id: u32) -> String {
 mod tests {
     use super::*;
     use crate::control::signals::diagnostic::DiagnosticCode;
+
+    #[test]
+    fn a_process_that_was_not_waited_for_has_ended() {
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        let began = std::time::Instant::now();
+        while !command(child.id()).is_empty() {
+            assert!(began.elapsed().as_secs() < 60, "{}", named(child.id()));
+            std::thread::yield_now();
+        }
+        assert!(fs::exists(format!("/proc/{}/stat", child.id())).unwrap(), "it is listed");
+        child.wait().unwrap();
+    }
 
     #[test]
     fn a_sentence_about_two_processes_names_both() {
