@@ -30,8 +30,8 @@ pub struct NumberTable {
 }
 
 impl NumberTable {
-    /// Reads a CSV file, or standard input for `-`, see [`NumberTable::from_reader`]. `group` is that of the columns, if the file
-    /// has several.
+    /// Reads a CSV file, or standard input for `-`, see [`NumberTable::from_reader`]. `group` names the group of
+    /// columns to read, if the file has several.
     pub fn read(
         path: &Path,
         group: Option<&str>,

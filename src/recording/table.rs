@@ -163,7 +163,7 @@ fn append_groups(row: &mut Vec<f64>, input: &Input, output: &Output, zero_ns: u6
     let measured = input.measurement.map(|it| (t(it.time_ns), it.pose));
     let estimated = measured.zip(output.platform);
     append(estimated.map(|((t, _), it)| pose(t, &task_coordinates(&it.pose, home))), pose_columns().len());
-    // The instant is also that of the lengths.
+    // The lengths have the same instant.
     append(measured.map(|(t, x)| pose(t, &x.unwrap_or([f64::NAN; 6]))), pose_columns().len());
 }
 
@@ -175,7 +175,7 @@ struct Section {
 }
 
 impl Section {
-    /// Columns of all fields but the excluded ones. Lengths and forces are named as those of other tables, which are in SI units.
+    /// Columns of all fields but the excluded ones. Lengths and forces have the names of the other tables: without unit, in SI.
     fn new(layout: &Layout, prefix: &str, excluded: &[&str]) -> Self {
         let is_of = |name: &str, field: &str| {
             name.strip_prefix(field).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))

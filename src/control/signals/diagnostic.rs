@@ -84,7 +84,10 @@ macro_rules! reaction {
 }
 
 macro_rules! codes {
-    ($($(#[doc = $doc:literal])* $([$default:ident])? $variant:ident = $number:literal, $reaction:ident, $comparison:expr, $name:literal, $remedy:literal;)*) => {
+    ($(
+        $(#[doc = $doc:literal])* $([$default:ident])?
+        $variant:ident = $number:literal, $reaction:ident, $comparison:expr, $name:literal, $remedy:literal;
+    )*) => {
         /// Code of a diagnostic: the reason why the platform is not under control, or soon will not be. A
         /// code below 100 is no fault.
         ///

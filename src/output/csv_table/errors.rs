@@ -12,7 +12,7 @@ use crate::output::numbers::MAX_MAGNITUDE;
 /// Errors shown of one file; a file with more has one mistake many times.
 const MAX_ERRORS_SHOWN: usize = 20;
 
-/// Characters shown of a header; that of a trajectory has 134 without units.
+/// Characters shown of a header. The header of a trajectory has 134 without units.
 const MAX_HEADER_SHOWN: usize = 240;
 
 /// Error of reading a table: the file, or its content.

@@ -5,7 +5,7 @@
 //!                                                        Ctrl-C, or a long pause -> boarding pose
 //! ```
 //!
-//! Datagrams are not authenticated: anybody who can send from an allowed address moves the platform, within the limits of the file.
+//! Datagrams are not authenticated: any program at an allowed address moves the platform, within the limits of the file.
 
 use std::io;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
