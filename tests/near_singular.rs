@@ -100,7 +100,7 @@ fn no_worse_than_twice_partial_pivoting() {
         decades.entry(scene.condition.log10() as i32).or_default().add(scene);
         families.insert(scene.family);
     });
-    assert_eq!(families.len(), 6, "{families:?}");
+    assert_eq!(families.len(), 7, "{families:?}");
     assert_eq!(decades.keys().copied().collect::<Vec<_>>(), (0..13).collect::<Vec<_>>());
     for (decade, compared) in decades {
         assert!(compared.count > 1000, "{}", compared.count);

@@ -99,6 +99,32 @@ fn random_layout(numbers: &mut Numbers) -> Machine {
     machine
 }
 
+/// At home three legs point to one point P, and three lie in a plane through P: two motions are free, so two singular values
+/// become small together, while the directions of the legs stay independent.
+fn two_free_motions(numbers: &mut Numbers) -> Machine {
+    let mut machine = machine("scattered");
+    let center = Vector3::new(0.0, 0.0, 1.0);
+    let [point, normal] = [numbers.vector() + center * 2.0, numbers.vector().normalize()];
+    let in_plane = |v: Vector3<f64>| v - normal * normal.dot(&(v - point));
+    let base: [_; 6] = core::array::from_fn(|k| {
+        let joint = numbers.vector();
+        if k < 3 { joint } else { in_plane(joint) }
+    });
+    let platform = core::array::from_fn(|k| {
+        let joint = if k < 3 {
+            base[k].lerp(&point, 0.5 + 0.2 * numbers.unit())
+        } else {
+            in_plane(center + numbers.vector() * 0.6)
+        };
+        joint - center
+    });
+    let universal_axis =
+        core::array::from_fn(|_| (numbers.vector() + Vector3::new(0.1, 0.2, 0.3)).normalize());
+    machine.home = [0.0, 0.0, 0.0, center.x, center.y, center.z];
+    machine.joints = Legs { base, platform, universal_axis }.joints(&machine.home);
+    machine
+}
+
 /// Motions near the poses of a way, closer and closer to `s`.
 fn approach(
     family: &'static str,
@@ -179,6 +205,11 @@ pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
         let depth = start.rotation.column(2).dot(&sink);
         let way = Way { start, turn: Vector3::zeros(), shift: start.rotation.column(2) * depth };
         approach("coplanar legs", &machine, &way, 1.0, &mut numbers, visit);
+    }
+    for _ in 0..100 {
+        let machine = two_free_motions(&mut numbers);
+        let way = Way { start: home(&machine), turn: numbers.vector(), shift: numbers.vector() * 0.3 };
+        approach("two free motions", &machine, &way, 0.0, &mut numbers, visit);
     }
     for _ in 0..150 {
         let machine = random_layout(&mut numbers);
