@@ -2,6 +2,7 @@
 
 mod common;
 
+mod batch;
 mod excitation;
 mod fidelity;
 mod identification;

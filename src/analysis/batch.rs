@@ -25,9 +25,7 @@ pub fn forces(
 ) {
     forces.par_chunks_mut(MOTIONS_PER_TASK).zip(motions.par_chunks(MOTIONS_PER_TASK)).for_each(
         |(forces, motions)| {
-            for (force, motion) in forces.iter_mut().zip(motions) {
-                *force = model.forces_of(fidelity, motion);
-            }
+            model.forces_of_all(fidelity, motions, forces);
             bar.inc(motions.len() as u64);
         },
     );

@@ -17,11 +17,10 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::LEGS;
 use super::factorization::{Factorization, LaneWrench, wrench_columns};
-use super::fidelity::{
-    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
-};
+use super::fidelity::{Fidelity, ModelTerms, with_terms};
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
+use super::lanes3::Lanes3;
 use super::leg::{JointForces, LegConstants, LegReaction};
 use super::machine::{Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
@@ -105,14 +104,7 @@ impl InverseDynamics {
 
     /// Actuator forces as by [`InverseDynamics::forces`], with a fidelity chosen at run time.
     pub fn forces_of(&self, fidelity: Fidelity, motion: &Motion) -> Option<[f64; LEGS]> {
-        match fidelity {
-            Fidelity::Gravity => self.forces::<Gravity>(motion),
-            Fidelity::MasslessLegs => self.forces::<MasslessLegs>(motion),
-            Fidelity::LumpedLegs => self.forces::<LumpedLegs>(motion),
-            Fidelity::NoVelocity => self.forces::<NoVelocity>(motion),
-            Fidelity::RigidLegs => self.forces::<RigidLegs>(motion),
-            Fidelity::Exact => self.forces::<Exact>(motion),
-        }
+        with_terms!(fidelity, M => self.forces::<M>(motion))
     }
 
     /// Actuator forces in lanes. Code for the generic instruction set sorts them, one load after another.
@@ -148,14 +140,15 @@ impl InverseDynamics {
         motion: &Motion,
         legs: &LegGeometry<S>,
     ) -> (LaneWrench<S>, f64x8<S>) {
-        let machine = &self.machine;
         let velocity = legs.velocity(simd, &motion.twist);
         // Terms that the fidelity omits are evaluated as for a platform at rest.
         let twist = if M::VELOCITY { motion.twist } else { Twist::default() };
         let acceleration = if M::ACCELERATION { motion.acceleration } else { Acceleration::default() };
         let map = acceleration_map(&twist, &acceleration);
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
-        let reaction = LegReaction::new::<M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
+        let universal_axis = Lanes3::load(simd, &self.machine.joints.universal_axis);
+        let reaction =
+            LegReaction::new::<M>(simd, &self.legs, universal_axis, legs, &velocity, joint_acceleration);
         let mut wrench = LaneWrench {
             torque: legs.arm.cross(reaction.transverse).folded(),
             force: reaction.transverse.folded(),
@@ -168,7 +161,8 @@ impl InverseDynamics {
         if M::VELOCITY {
             accel = legs.accel(&velocity, joint_acceleration);
         }
-        (wrench, reaction.axial + self.drive_force(simd, velocity.rate, accel))
+        let friction = [self.viscous_friction, self.coulomb_friction].map(|lanes| lanes.load(simd));
+        (wrench, reaction.axial + self.drive_force(simd, friction, velocity.rate, accel))
     }
 
     /// Forces of the platform and the drives on each leg, per unit of the acceleration of its joint along x, y
@@ -183,6 +177,16 @@ impl InverseDynamics {
         [x, y, z]
     }
 
+    /// Constants of the legs.
+    pub(super) fn leg_constants(&self) -> &LegConstants {
+        &self.legs
+    }
+
+    /// Viscous and Coulomb friction of the legs.
+    pub(super) fn friction(&self) -> [&LegLanes; 2] {
+        [&self.viscous_friction, &self.coulomb_friction]
+    }
+
     /// Principal axes of the platform.
     pub(super) fn axes(&self) -> &PrincipalAxes {
         &self.axes
@@ -191,12 +195,17 @@ impl InverseDynamics {
     /// Drive force `reflected L'' + viscous L' + coulomb sign(L')`; the sign is proportional below the
     /// smoothing speed.
     #[inline(always)]
-    fn drive_force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
+    pub(super) fn drive_force<S: Simd>(
+        &self,
+        simd: S,
+        [viscous, coulomb]: [f64x8<S>; 2],
+        rate: f64x8<S>,
+        accel: f64x8<S>,
+    ) -> f64x8<S> {
         let splat = |value: f64| f64x8::splat(simd, value);
         let one = splat(1.0);
         let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
-        let friction =
-            self.viscous_friction.load(simd).fused_mul_add(rate, self.coulomb_friction.load(simd) * sign);
+        let friction = viscous.fused_mul_add(rate, coulomb * sign);
         splat(self.machine.actuator.reflected_mass).fused_mul_add(accel, friction)
     }
 }

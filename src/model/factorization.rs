@@ -105,7 +105,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         let inverse_d_s = one / d_s;
 
         let ([d_a, ..], [d_s, ..]) = (d_a.legs(), d_s.legs());
-        let uses_blocks = d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * joints.radius_cubed;
+        let uses_blocks = are_regular_blocks(d_a, d_s, joints.radius_cubed);
         let determinants = [d_a, d_s];
         Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, uses_blocks }
     }
@@ -259,6 +259,12 @@ pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) 
         row.copy_from_slice(&triples.unpack(lanes));
     }
     n
+}
+
+/// Whether both determinants are large enough for block elimination; `radius_cubed` is that of [`Joints`].
+#[inline(always)]
+pub(super) fn are_regular_blocks(d_a: f64, d_s: f64, radius_cubed: f64) -> bool {
+    d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * radius_cubed
 }
 
 /// Returns `v_i+1 x v_i+2` in each lane i.

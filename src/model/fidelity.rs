@@ -77,6 +77,24 @@ fidelity!(
     Exact, Links, true, true, true
 );
 
+/// Evaluates an expression with the terms of a fidelity that is chosen at run time.
+macro_rules! with_terms {
+    ($fidelity:expr, $terms:ident => $value:expr) => {
+        $crate::model::fidelity::with_terms!(
+            $fidelity, $terms => $value, Gravity MasslessLegs LumpedLegs NoVelocity RigidLegs Exact
+        )
+    };
+    ($fidelity:expr, $terms:ident => $value:expr, $($name:ident)*) => {
+        match $fidelity {
+            $($crate::model::fidelity::Fidelity::$name => {
+                type $terms = $crate::model::fidelity::$name;
+                $value
+            })*
+        }
+    };
+}
+pub(super) use with_terms;
+
 /// Model fidelity chosen at run time, from gravity only to all terms.
 ///
 /// ```

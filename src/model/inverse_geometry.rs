@@ -62,7 +62,18 @@ impl<S: Simd> LegGeometry<S> {
     #[inline(always)]
     fn of(simd: S, platform: &[LegLanes; 3], joints: &Joints, pose: &Pose) -> Self {
         let arm = Lanes3::load(simd, platform).transformed(simd, &pose.rotation);
-        let s = Lanes3::splat(simd, &pose.position) + arm - Lanes3::load(simd, &joints.base);
+        Self::between(simd, Lanes3::load(simd, &joints.base), Lanes3::splat(simd, &pose.position), arm)
+    }
+
+    /// Geometry of legs from the joints on the base to the arms at a position.
+    #[inline(always)]
+    pub fn between(
+        simd: S,
+        base: Lanes3<f64x8<S>>,
+        position: Lanes3<f64x8<S>>,
+        arm: Lanes3<f64x8<S>>,
+    ) -> Self {
+        let s = position + arm - base;
         let length = s.dot(s).sqrt();
         let inverse_length = f64x8::splat(simd, 1.0) / length;
         Self { arm, direction: s * inverse_length, length, inverse_length }
@@ -78,7 +89,13 @@ impl<S: Simd> LegGeometry<S> {
     /// Rates L' and n' for a twist.
     #[inline(always)]
     pub fn velocity(&self, simd: S, twist: &Twist) -> LegVelocity<S> {
-        let joint = Lanes3::splat(simd, &twist.linear) + Lanes3::splat(simd, &twist.angular).cross(self.arm);
+        self.velocity_in_lanes(Lanes3::splat(simd, &twist.angular), Lanes3::splat(simd, &twist.linear))
+    }
+
+    /// Rates L' and n' for the angular velocity and the velocity of C in each lane.
+    #[inline(always)]
+    pub fn velocity_in_lanes(&self, angular: Lanes3<f64x8<S>>, linear: Lanes3<f64x8<S>>) -> LegVelocity<S> {
+        let joint = linear + angular.cross(self.arm);
         let rate = self.direction.dot(joint);
         let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length;
         LegVelocity { rate, direction }

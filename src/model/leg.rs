@@ -32,6 +32,7 @@
 //! spin is singular; `MIN_UNIVERSAL_SINE_SQUARED` keeps the arithmetic finite there.
 
 use fearless_simd::{Simd, f64x8, prelude::*};
+use nalgebra::Vector3;
 
 use super::LEGS;
 use super::fidelity::{LegInertia, ModelTerms};
@@ -67,6 +68,8 @@ pub(super) struct LegConstants {
     lumped_mass: LegLanes,
     /// The platform's mass in the padding, 0 for legs.
     platform_mass: LegLanes,
+    /// Gravity, base axes \[m/s^2\].
+    gravity: Vector3<f64>,
 }
 
 impl LegConstants {
@@ -96,6 +99,23 @@ impl LegConstants {
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
+            gravity: machine.gravity,
+        }
+    }
+
+    /// Constants of one leg in all lanes, without the platform.
+    pub fn of_one_leg(&self) -> Self {
+        let leg = |lanes: &LegLanes| LegLanes([lanes.0[0]; 8]);
+        Self {
+            jt: self.jt.each_ref().map(leg),
+            rod_mass: leg(&self.rod_mass),
+            first_moment: leg(&self.first_moment),
+            rod_moment: leg(&self.rod_moment),
+            axial_inertia: leg(&self.axial_inertia),
+            legs_only: leg(&self.legs_only),
+            lumped_mass: leg(&self.lumped_mass),
+            platform_mass: leg(&self.platform_mass),
+            gravity: self.gravity,
         }
     }
 }
@@ -121,14 +141,14 @@ impl<S: Simd> LegReaction<S> {
     #[inline(always)]
     pub fn new<M: ModelTerms>(
         simd: S,
-        machine: &Machine,
         constants: &LegConstants,
+        universal_axis: Lanes3<f64x8<S>>,
         legs: &LegGeometry<S>,
         velocity: &LegVelocity<S>,
         joint_acceleration: Lanes3<f64x8<S>>,
     ) -> Self {
         let load = |lanes: &LegLanes| lanes.load(simd);
-        let gravity = Lanes3::splat(simd, &machine.gravity);
+        let gravity = Lanes3::splat(simd, &constants.gravity);
         if M::LEGS != LegInertia::Links {
             // Points at B, including the platform's point: no projection.
             let mass =
@@ -153,7 +173,7 @@ impl<S: Simd> LegReaction<S> {
         }
         if M::SPIN {
             let ix_over_l = load(&constants.axial_inertia) * inverse_length;
-            transverse = spin(simd, machine, legs, velocity, joint_acceleration, ix_over_l, transverse);
+            transverse = spin(universal_axis, legs, velocity, joint_acceleration, ix_over_l, transverse);
         }
         // n' and the spin are already normal to n: projecting them as well costs nothing.
         transverse = transverse.minus_scaled(transverse.dot(n) * load(&constants.legs_only), n);
@@ -205,8 +225,7 @@ impl LegConstants {
 /// Returns `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`.
 #[inline(always)]
 fn spin<S: Simd>(
-    simd: S,
-    machine: &Machine,
+    u: Lanes3<f64x8<S>>,
     legs: &LegGeometry<S>,
     velocity: &LegVelocity<S>,
     joint_acceleration: Lanes3<f64x8<S>>,
@@ -214,7 +233,7 @@ fn spin<S: Simd>(
     sum: Lanes3<f64x8<S>>,
 ) -> Lanes3<f64x8<S>> {
     let (n, n_rate) = (legs.direction, velocity.direction);
-    let u = Lanes3::load(simd, &machine.joints.universal_axis);
+    let simd = n.x.simd;
     let k = u.cross(n);
     let inverse_yy = f64x8::splat(simd, 1.0) / k.dot(k).max(f64x8::splat(simd, MIN_UNIVERSAL_SINE_SQUARED));
     let (un, un_rate, p) = (u.dot(n), u.dot(n_rate), n_rate.dot(k));
