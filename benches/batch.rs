@@ -1,5 +1,6 @@
 //! Cost of the batch form against its size: nanoseconds per pose up to ten million poses, `cargo bench --bench batch`.
 //!
+//! Beside it one pose after the other with its legs in lanes, on one thread.
 //! A size for which the memory is too small is named and left out. `-- --quick` ends at a hundred thousand poses.
 
 mod support;
@@ -63,16 +64,25 @@ fn run(quick: bool) -> Result<(), Failure> {
     bar.finish_and_clear();
     let mut forces = vec![None; largest];
     println!("{}", support::provenance());
-    println!("{} threads", rayon::current_num_threads());
+    println!("ns per pose, exact model; {} threads", rayon::current_num_threads());
+    println!("{:>9} {:>12} {:>12} {:>14}", "poses", "all threads", "one thread", "legs in lanes");
     for size in sizes {
         let repetitions = (largest / size).min(1_000);
-        let started = Instant::now();
-        for _ in 0..repetitions {
-            let part = motions.get(..size).unwrap_or_default();
-            batch::forces(&model, Fidelity::Exact, part, &mut forces, &ProgressBar::hidden());
-        }
-        let ns = started.elapsed().as_secs_f64() * 1e9 / (repetitions * size) as f64;
-        println!("{size:>9} poses: {ns:>6.1} ns per pose");
+        let part = motions.get(..size).unwrap_or_default();
+        let ns = |evaluate: &mut dyn FnMut()| {
+            let started = Instant::now();
+            (0..repetitions).for_each(|_| evaluate());
+            started.elapsed().as_secs_f64() * 1e9 / (repetitions * size) as f64
+        };
+        let all_threads =
+            ns(&mut || batch::forces(&model, Fidelity::Exact, part, &mut forces, &ProgressBar::hidden()));
+        let one_thread = ns(&mut || model.forces_of_all(Fidelity::Exact, part, &mut forces));
+        let legs_in_lanes = ns(&mut || {
+            for (force, motion) in forces.iter_mut().zip(part) {
+                *force = model.forces_of(Fidelity::Exact, motion);
+            }
+        });
+        println!("{size:>9} {all_threads:>12.1} {one_thread:>12.1} {legs_in_lanes:>14.1}");
     }
     omissions.finish()
 }

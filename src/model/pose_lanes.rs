@@ -45,6 +45,14 @@ struct Column<S: Simd> {
     axial: f64x8<S>,
 }
 
+impl<S: Simd> Column<S> {
+    #[inline(always)]
+    fn zero(simd: S) -> Self {
+        let zero = Lanes3::splat(simd, &Vector3::zeros());
+        Self { moment: zero, direction: zero, axial: zero.x }
+    }
+}
+
 /// Columns of a 3 x 3 matrix in each lane.
 #[derive(Clone, Copy)]
 struct Matrix<S: Simd>([Lanes3<f64x8<S>>; 3]);
@@ -72,10 +80,11 @@ impl InverseDynamics {
         let constants = self.leg_constants().of_one_leg();
         let joints = self.joints_in_lane_order();
         dispatch!(self.machine().level, simd => {
+            let mut columns = [Column::zero(simd); LEGS];
             for (motions, forces) in motions.chunks(LANES).zip(forces.chunks_mut(LANES)) {
                 let eight = core::array::from_fn(|k| motions.get(k).unwrap_or(&motions[0]));
-                let (lanes, are_regular) = self.forces_in_lanes::<_, M>(simd, &constants, &joints, &eight);
-                let [a, b, c, d, e, f] = lanes.map(|lane| lane.to_array());
+                let (lanes, are_regular) = self.forces_in_lanes::<_, M>(simd, &constants, &joints, &eight, &mut columns);
+                let [a, b, c, d, e, f] = lanes;
                 for (k, (force, motion)) in forces.iter_mut().zip(motions).enumerate() {
                     *force = if are_regular[k] {
                         Some(self.joints().triples.unpack(&LegLanes([a[k], b[k], c[k], 0.0, d[k], e[k], f[k], 0.0])))
@@ -114,34 +123,34 @@ impl InverseDynamics {
         constants: &LegConstants,
         joints: &[Joint; LEGS],
         motions: &[&Motion; LANES],
-    ) -> ([f64x8<S>; LEGS], [bool; LANES]) {
+        columns: &mut [Column<S>; LEGS],
+    ) -> ([[f64; LANES]; LEGS], [bool; LANES]) {
         let motions = Motions::load(simd, motions);
         let zero = Lanes3::splat(simd, &Vector3::zeros());
         // Terms that the fidelity omits are evaluated as for a platform at rest.
         let omega = if M::VELOCITY { motions.angular_velocity } else { zero };
         let [turning, linear] =
             if M::ACCELERATION { [motions.angular_acceleration, motions.acceleration] } else { [zero, zero] };
-        let acceleration_of =
-            |arm: Lanes3<f64x8<S>>| linear + turning.cross(arm) + omega.cross(omega.cross(arm));
+        let map = acceleration_map(omega, turning);
 
         let platform = &self.machine().platform;
         let arm = motions.rotation.times_vector(simd, &platform.center_of_mass);
         let gravity = Lanes3::splat(simd, &self.machine().gravity);
-        let mut force = (acceleration_of(arm) - gravity) * f64x8::splat(simd, platform.mass);
+        let mut force = (linear + map.times(arm) - gravity) * f64x8::splat(simd, platform.mass);
         let mut torque = arm.cross(force);
         if M::ACCELERATION {
             let (w, a) =
                 (motions.rotation.transposed_times(omega), motions.rotation.transposed_times(turning));
-            let inertia = |v: Lanes3<f64x8<S>>| v.transformed(simd, &platform.inertia);
-            torque = torque + motions.rotation.times(inertia(a) + w.cross(inertia(w)));
+            let torque_of_turning = a.transformed(simd, &platform.inertia);
+            let momentum = w.transformed(simd, &platform.inertia);
+            torque = torque + motions.rotation.times(torque_of_turning + w.cross(momentum));
         }
 
-        let mut columns = [Column { moment: zero, direction: zero, axial: f64x8::splat(simd, 0.0) }; LEGS];
-        for (joint, column) in joints.iter().zip(&mut columns) {
+        for (joint, column) in joints.iter().zip(columns.iter_mut()) {
             let arm = motions.rotation.times_vector(simd, &joint.platform);
             let leg = LegGeometry::between(simd, Lanes3::splat(simd, &joint.base), motions.position, arm);
             let velocity = leg.velocity_in_lanes(motions.angular_velocity, motions.velocity);
-            let joint_acceleration = acceleration_of(arm);
+            let joint_acceleration = linear + map.times(arm);
             let universal_axis = Lanes3::splat(simd, &joint.universal_axis);
             let reaction =
                 LegReaction::new::<M>(simd, constants, universal_axis, &leg, &velocity, joint_acceleration);
@@ -156,12 +165,12 @@ impl InverseDynamics {
                     accel = leg.accel(&velocity, joint_acceleration);
                 }
                 let friction =
-                    [joint.viscous_friction, joint.coulomb_friction].map(|value| f64x8::splat(simd, value));
+                    [f64x8::splat(simd, joint.viscous_friction), f64x8::splat(simd, joint.coulomb_friction)];
                 axial += self.drive_force(simd, friction, velocity.rate, accel);
             }
             *column = Column { moment: arm.cross(leg.direction), direction: leg.direction, axial };
         }
-        balanced(simd, self.machine().joints.radius_cubed, &columns, torque, force)
+        balanced(simd, self.machine().joints.radius_cubed, columns, torque, force)
     }
 }
 
@@ -173,36 +182,57 @@ fn balanced<S: Simd>(
     columns: &[Column<S>; LEGS],
     torque: Lanes3<f64x8<S>>,
     force: Lanes3<f64x8<S>>,
-) -> ([f64x8<S>; LEGS], [bool; LANES]) {
+) -> ([[f64; LANES]; LEGS], [bool; LANES]) {
     let one = f64x8::splat(simd, 1.0);
     let [a0, a1, a2, b0, b1, b2] = columns;
     let adjugate = adjugate([a0.direction, a1.direction, a2.direction]);
     let d_a = a0.direction.dot(adjugate[0]);
     let inverse_d_a = one / d_a;
     let [i0, i1, i2] = [adjugate[0] * inverse_d_a, adjugate[1] * inverse_d_a, adjugate[2] * inverse_d_a];
-    // Rows of X for one leg of B, and its column of S.
-    let eliminated = |b: &Column<S>| {
-        let x = [i0.dot(b.direction), i1.dot(b.direction), i2.dot(b.direction)];
-        let s = b
-            .moment
-            .minus_scaled(x[0], a0.moment)
-            .minus_scaled(x[1], a1.moment)
-            .minus_scaled(x[2], a2.moment);
-        (x, s)
-    };
-    let ((x0, s0), (x1, s1), (x2, s2)) = (eliminated(b0), eliminated(b1), eliminated(b2));
+    let a = [a0.moment, a1.moment, a2.moment];
+    let inverse = [i0, i1, i2];
+    let [x0, x1, x2] = [
+        products(&inverse, b0.direction),
+        products(&inverse, b1.direction),
+        products(&inverse, b2.direction),
+    ];
+    let [s0, s1, s2] =
+        [eliminated(b0.moment, &x0, &a), eliminated(b1.moment, &x1, &a), eliminated(b2.moment, &x2, &a)];
     let [c0, c1, c2] = self::adjugate([s0, s1, s2]);
     let d_s = s0.dot(c0);
     let inverse_d_s = one / d_s;
 
-    let g = [i0.dot(force), i1.dot(force), i2.dot(force)];
-    let rest =
-        torque.minus_scaled(g[0], a0.moment).minus_scaled(g[1], a1.moment).minus_scaled(g[2], a2.moment);
+    let [g0, g1, g2] = products(&inverse, force);
+    let rest = eliminated(torque, &[g0, g1, g2], &a);
     let [h0, h1, h2] = [c0.dot(rest) * inverse_d_s, c1.dot(rest) * inverse_d_s, c2.dot(rest) * inverse_d_s];
-    let of_a = |k: usize, column: &Column<S>| g[k] - h0 * x0[k] - h1 * x1[k] - h2 * x2[k] + column.axial;
-    let forces = [of_a(0, a0), of_a(1, a1), of_a(2, a2), h0 + b0.axial, h1 + b1.axial, h2 + b2.axial];
+    let forces = [
+        g0 - h0 * x0[0] - h1 * x1[0] - h2 * x2[0] + a0.axial,
+        g1 - h0 * x0[1] - h1 * x1[1] - h2 * x2[1] + a1.axial,
+        g2 - h0 * x0[2] - h1 * x1[2] - h2 * x2[2] + a2.axial,
+        h0 + b0.axial,
+        h1 + b1.axial,
+        h2 + b2.axial,
+    ];
     let (d_a, d_s) = (d_a.to_array(), d_s.to_array());
+    let [f0, f1, f2, f3, f4, f5] = forces;
+    let forces = [f0.to_array(), f1.to_array(), f2.to_array(), f3.to_array(), f4.to_array(), f5.to_array()];
     (forces, core::array::from_fn(|k| are_regular_blocks(d_a[k], d_s[k], radius_cubed)))
+}
+
+/// Dot products with three vectors.
+#[inline(always)]
+fn products<S: Simd>([a, b, c]: &[Lanes3<f64x8<S>>; 3], v: Lanes3<f64x8<S>>) -> [f64x8<S>; 3] {
+    [a.dot(v), b.dot(v), c.dot(v)]
+}
+
+/// A vector less multiples of three others.
+#[inline(always)]
+fn eliminated<S: Simd>(
+    v: Lanes3<f64x8<S>>,
+    [x, y, z]: &[f64x8<S>; 3],
+    [a, b, c]: &[Lanes3<f64x8<S>>; 3],
+) -> Lanes3<f64x8<S>> {
+    v.minus_scaled(*x, *a).minus_scaled(*y, *b).minus_scaled(*z, *c)
 }
 
 /// Cross products of the two other vectors, in cyclic order.
@@ -211,28 +241,46 @@ fn adjugate<S: Simd>([a, b, c]: [Lanes3<f64x8<S>>; 3]) -> [Lanes3<f64x8<S>>; 3] 
     [b.cross(c), c.cross(a), a.cross(b)]
 }
 
+/// Matrix S of each motion, see [`super::platform::acceleration_map`].
+#[inline(always)]
+fn acceleration_map<S: Simd>(w: Lanes3<f64x8<S>>, a: Lanes3<f64x8<S>>) -> Matrix<S> {
+    let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
+    let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
+    Matrix([
+        Lanes3 { x: -yy - zz, y: xy + a.z, z: xz - a.y },
+        Lanes3 { x: xy - a.z, y: -xx - zz, z: yz + a.x },
+        Lanes3 { x: xz + a.y, y: yz - a.x, z: -xx - yy },
+    ])
+}
+
+/// One vector of each motion.
+#[inline(always)]
+fn vectors<S: Simd>(
+    simd: S,
+    motions: &[&Motion; LANES],
+    of: impl Fn(&Motion) -> Vector3<f64>,
+) -> Lanes3<f64x8<S>> {
+    Lanes3 {
+        x: f64x8::load_array(simd, motions.map(|motion| of(motion).x)),
+        y: f64x8::load_array(simd, motions.map(|motion| of(motion).y)),
+        z: f64x8::load_array(simd, motions.map(|motion| of(motion).z)),
+    }
+}
+
 impl<S: Simd> Motions<S> {
     #[inline(always)]
     fn load(simd: S, motions: &[&Motion; LANES]) -> Self {
-        let vector = |of: fn(&Motion) -> Vector3<f64>| {
-            let vectors = motions.map(of);
-            Lanes3 {
-                x: f64x8::load_array(simd, vectors.map(|v| v.x)),
-                y: f64x8::load_array(simd, vectors.map(|v| v.y)),
-                z: f64x8::load_array(simd, vectors.map(|v| v.z)),
-            }
-        };
         Self {
             rotation: Matrix([
-                vector(|m| m.pose.rotation.column(0).into()),
-                vector(|m| m.pose.rotation.column(1).into()),
-                vector(|m| m.pose.rotation.column(2).into()),
+                vectors(simd, motions, |m| m.pose.rotation.column(0).into()),
+                vectors(simd, motions, |m| m.pose.rotation.column(1).into()),
+                vectors(simd, motions, |m| m.pose.rotation.column(2).into()),
             ]),
-            position: vector(|m| m.pose.position),
-            angular_velocity: vector(|m| m.twist.angular),
-            velocity: vector(|m| m.twist.linear),
-            angular_acceleration: vector(|m| m.acceleration.angular),
-            acceleration: vector(|m| m.acceleration.linear),
+            position: vectors(simd, motions, |m| m.pose.position),
+            angular_velocity: vectors(simd, motions, |m| m.twist.angular),
+            velocity: vectors(simd, motions, |m| m.twist.linear),
+            angular_acceleration: vectors(simd, motions, |m| m.acceleration.angular),
+            acceleration: vectors(simd, motions, |m| m.acceleration.linear),
         }
     }
 }
