@@ -50,9 +50,12 @@ pub struct Triples {
 }
 
 impl Triples {
+    /// Legs that are already in the order of their lanes.
+    pub(super) const LANE_ORDER: Self = Self { lanes: [0, 1, 2, 4, 5, 6] };
+
     /// The ten ways to split six legs in two triples, by the partners of the first leg.
     const ALL: [Self; 10] = [
-        Self { lanes: [0, 1, 2, 4, 5, 6] },
+        Self::LANE_ORDER,
         Self { lanes: [0, 1, 4, 2, 5, 6] },
         Self { lanes: [0, 1, 4, 5, 2, 6] },
         Self { lanes: [0, 1, 4, 5, 6, 2] },
