@@ -83,9 +83,21 @@ fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     }
 }
 
-/// Threshold with at most three digits.
-pub fn plain(x: f64) -> String {
-    format!("{}", format!("{x:.2e}").parse().unwrap_or(x))
+/// Thresholds as text, with the fewest digits from three on with which they differ.
+pub fn distinct_texts(thresholds: &[f64]) -> Vec<String> {
+    let texts = |digits| thresholds.iter().map(|x| plain(*x, digits)).collect::<Vec<_>>();
+    let differ = |texts: &Vec<String>| texts.windows(2).all(|pair| pair.first() != pair.last());
+    (3..=17).map(texts).find(differ).unwrap_or_default()
+}
+
+/// Number with at most so many digits.
+pub fn plain(x: f64, digits: usize) -> String {
+    // The worst threshold of a quantity that must be above zero.
+    if x.abs() < 1e-300 {
+        "0".into()
+    } else {
+        format!("{}", format!("{x:.*e}", digits - 1).parse().unwrap_or(x))
+    }
 }
 
 #[cfg(test)]
@@ -108,6 +120,6 @@ mod tests {
                 assert!(numbers.is_sorted());
             }
         }
-        assert_eq!([0.15000000000000002, 100.0, 1234.0].map(plain), ["0.15", "100", "1230"]);
+        assert_eq!([0.15000000000000002, 100.0, 1234.0].map(|x| plain(x, 3)), ["0.15", "100", "1230"]);
     }
 }

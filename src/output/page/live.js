@@ -75,6 +75,7 @@ async function follow() {
         setTime(HEAD.length_s);
       }
       if (redrawn++ % 10 === 0) {
+        separateComponents();
         drawDistributions(fresh.distributions);
         fillList();
       }
