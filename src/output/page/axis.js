@@ -3,7 +3,7 @@
 // Values whose span is a smaller share of their size are constant: numbers of four bytes have seven digits.
 const FLAT_SHARE = 1e-6;
 // Values within this span are constant, and smaller values are zero: they are rounding errors.
-const FLAT_SPAN = 1e-10;
+const FLAT_SPAN = 1e-9;
 // Largest ratio of a common axis to the range of a component that is readable on it.
 const MAX_COMMON_RATIO = 20;
 // Units that take prefixes, alone or divided by another one, each with its greatest power of ten.

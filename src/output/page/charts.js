@@ -5,8 +5,10 @@ const RIGHT_PX = 22;
 const PLOT_HEIGHT_PX = 152;
 // Height of each of the plots of a panel whose components have axes of their own.
 const SMALL_PLOT_PX = 84;
+// Number of ticks of an axis of values at most; there are two at least.
+const VALUE_TICKS = 5;
 // Below the plot: numbers, and the label of the time.
-const NUMBERS_PX = 30;
+const NUMBERS_PX = 28;
 const LABEL_PX = 18;
 const panels = [];
 // The charts of all panels.
@@ -120,18 +122,18 @@ function addChart(section, panel, isLowest) {
   const box = element("div", { className: "chart" }, plot);
   section.append(box);
   const made = { plot, series, axis: axisOf(panel.label, 0, 1, 0, 2) };
-  const timeAxis = (chart) => axisOf("time [s]", range.from, range.to, 0, Math.max(2, chart.bbox.width / uPlot.pxRatio / 90));
+  const timeAxis = (chart) => axisOf("time [s]", range.from, range.to, 0, Math.max(2, chart.bbox.width / uPlot.pxRatio / 70));
   const valueAxis = (_, low, high) => {
-    made.axis = axisOf(panel.label, low ?? 0, high ?? 1, 0.05, panel.height / 28);
+    made.axis = axisOf(panel.label, low ?? 0, high ?? 1, 0.05, VALUE_TICKS);
     caption.textContent = made.axis.title;
     return [made.axis.low, made.axis.high];
   };
   const xAxis = {
-    size: NUMBERS_PX + (isLowest ? LABEL_PX : 0), label: isLowest ? (chart) => timeAxis(chart).title : null,
+    label: isLowest ? (chart) => timeAxis(chart).title : null,
     splits: (chart) => timeAxis(chart).ticks, values: (chart) => timeAxis(chart).texts,
   };
   const options = {
-    width: plot.clientWidth || 600, height: panel.height + 8 + xAxis.size, legend: { show: false },
+    width: plot.clientWidth || 600, height: panel.height + 8 + NUMBERS_PX + (isLowest ? LABEL_PX : 0), legend: { show: false },
     axes: axes(xAxis, { splits: () => made.axis.ticks, values: () => made.axis.texts }),
     scales: { x: { time: false, range: () => [range.from, range.to] }, y: { range: valueAxis } },
     series: [{}].concat(series.map((it) => ({ ...it, points: { show: false }, spanGaps: false }))),
@@ -233,7 +235,7 @@ function distributionOf(section, distributions, ends) {
   const options = {
     width: plot.clientWidth || 600, height: 230, legend: { show: false },
     axes: axes(
-      { label: "time", size: NUMBERS_PX + LABEL_PX, values: decades((tick) => quantityText(1e-6 * tick, "s")) },
+      { label: "time", values: decades((tick) => quantityText(1e-6 * tick, "s")) },
       { label: "cycles", size: Y_AXIS_PX - LABEL_PX, values: decades(count) },
     ),
     scales: {

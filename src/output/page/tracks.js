@@ -79,7 +79,7 @@ function drawTrack(pen, track, top, width) {
 }
 
 function drawScale(pen, top, width) {
-  const { ticks, texts, title } = axisOf("time [s]", range.from, range.to, 0, Math.max(2, width / 90));
+  const { ticks, texts, title } = axisOf("time [s]", range.from, range.to, 0, Math.max(2, width / 70));
   pen.textAlign = "center";
   ticks.forEach((tick, k) => {
     const x = trackX(tick, width);
