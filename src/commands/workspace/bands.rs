@@ -103,6 +103,7 @@ pub fn plain(x: f64, digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::random::Random;
 
     #[test]
     fn numbers_are_round_and_few() {
@@ -121,5 +122,34 @@ mod tests {
             }
         }
         assert_eq!([0.15000000000000002, 100.0, 1234.0].map(|x| plain(x, 3)), ["0.15", "100", "1230"]);
+    }
+
+    #[test]
+    fn thresholds_differ_as_text_over_twelve_decades() {
+        let mut random = Random::new(2);
+        for k in 0..5000 {
+            let low = 10f64.powf(12.0 * random.uniform() - 6.0);
+            let high = low * (1.0 + 10f64.powf(8.0 * random.uniform() - 6.0));
+            let [lower, higher] = [Better::Lower, Better::Higher].map(|better| {
+                let (worst, max_force) = (if k % 2 == 0 { 0.7 * low } else { 1.5 * high }, f64::INFINITY);
+                let quantity =
+                    Quantity { label: "", value: |quality| quality.condition, better, worst, max_force };
+                let quality = |condition| PoseQuality {
+                    condition,
+                    stroke_margin: 1.0,
+                    determinant: 1.0,
+                    worst_force: 1.0,
+                    payload: 1.0,
+                };
+                distinct_texts(&quantity.thresholds([quality(low), quality(high)].iter()))
+            });
+            for texts in [lower, higher] {
+                let all: std::collections::BTreeSet<_> = texts.iter().collect();
+                assert!(
+                    all.len() == texts.len() && !texts.concat().contains('e'),
+                    "{low} to {high}: {texts:?}"
+                );
+            }
+        }
     }
 }

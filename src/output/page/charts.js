@@ -206,12 +206,12 @@ function resizeCharts() {
 let distributionChart = null;
 function drawDistributions(distributions) {
   const section = document.getElementById("distributions");
-  section.querySelectorAll(".chart, .table").forEach((old) => old.remove());
+  section.querySelectorAll(".chart, .wide").forEach((old) => old.remove());
   if (distributionChart) distributionChart.chart.destroy();
   distributionChart = null;
   const ends = [...new Set(distributions.flatMap((it) => it.bars.map(([at]) => at)))].sort((a, b) => a - b);
   if (ends.length > 0) distributionChart = distributionOf(section, distributions, ends);
-  section.append(percentiles(distributions));
+  section.append(element("div", { className: "wide" }, percentiles(distributions)));
 }
 
 // Least number on the axis: nothing is drawn below one cycle.
