@@ -53,6 +53,8 @@ impl Axis {
         let (low, high) = (low.min(first * step), high.max(last * step));
         let ticks = (first as i64..=last as i64).map(|tick| tick as f64 * step).collect();
         let exponent = exponent_of(label, first.abs().max(last.abs()) * step);
+        // 1099.995 mm rather than 1.099995 m.
+        let exponent = if power < -4 { exponent.min(-3) } else { exponent };
         Self { low, high, ticks, label: label.into(), exponent, step_power: power }
     }
 

@@ -149,3 +149,25 @@ fn machine(config: &Config, coordinates: &Coordinates) -> MachineHead {
 pub fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::coordinates::tests::framed;
+    use crate::model::inverse_geometry::leg_lengths;
+    use crate::model::task::TaskState;
+
+    #[test]
+    fn a_machine_in_other_frames_has_the_same_legs() {
+        let (config, coordinates) = framed();
+        let lengths = leg_lengths(&config.machine, &config.machine.home_pose());
+        for coordinates in [coordinates, Coordinates::default()] {
+            let MachineHead { base, platform, home, .. } = machine(&config, &coordinates);
+            let home = TaskState::at_rest(home).motion().pose;
+            for ((base, platform), length) in base.iter().zip(platform).zip(lengths) {
+                let leg = home.position + home.rotation * Vector3::from(platform) - Vector3::from(*base);
+                assert!((leg.norm() - length).abs() < 1e-12, "{} {length}", leg.norm());
+            }
+        }
+    }
+}

@@ -211,6 +211,7 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::coordinates::tests::framed;
     use crate::control::controller::Output;
     use crate::control::sensing::localization::PlatformState;
     use crate::control::signals::inputs::{Input, Measurement};
@@ -278,6 +279,28 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn angles_and_positions_are_those_of_the_tool_in_the_work_frame() {
+        let (config, coordinates) = framed();
+        let platform = Some(PlatformState {
+            pose: config.machine.home_pose(),
+            twist: Twist::default(),
+            condition: 1.0,
+            time_to_singularity: f64::INFINITY,
+        });
+        let reference = Some(TaskState::at_rest(config.machine.home).motion());
+        let output = Output { platform, reference, ..Output::default() };
+        let mut signals = Signals::new(&config.machine, CycleInstants::default(), coordinates);
+        let row = signals.row(&CycleMessage::new(&Input::default(), &output));
+        for (angle, position) in [("angle", "position"), ("angle_ref", "position_ref")] {
+            let [angles, positions] = [angle, position].map(|name| &row[column(name)..column(name) + 3]);
+            assert!(
+                (angles[2] + 90.0).abs() < 1e-5 && (positions[1] + 0.45).abs() < 1e-6,
+                "{angles:?} {positions:?}"
+            );
         }
     }
 

@@ -130,10 +130,11 @@ mod tests {
         for k in 0..5000 {
             let low = 10f64.powf(12.0 * random.uniform() - 6.0);
             let high = low * (1.0 + 10f64.powf(8.0 * random.uniform() - 6.0));
-            let [lower, higher] = [Better::Lower, Better::Higher].map(|better| {
-                let (worst, max_force) = (if k % 2 == 0 { 0.7 * low } else { 1.5 * high }, f64::INFINITY);
-                let quantity =
-                    Quantity { label: "", value: |quality| quality.condition, better, worst, max_force };
+            let worst = if k % 2 == 0 { 0.7 * low } else { 1.5 * high };
+            let [lower, higher] = [(Better::Lower, worst), (Better::Higher, 0.0)].map(|(better, worst)| {
+                let max_force = f64::INFINITY;
+                let value = |quality: &PoseQuality| quality.condition;
+                let quantity = Quantity { label: "", value, better, worst, max_force };
                 let quality = |condition| PoseQuality {
                     condition,
                     stroke_margin: 1.0,

@@ -27,7 +27,8 @@ function axisOf(label, low, high, margin, count) {
   // A tick just outside is worth a hair of space.
   const [first, last] = [Math.ceil(low / step - 0.02), Math.floor(high / step + 0.02)];
   const ticks = Array.from({ length: last - first + 1 }, (_, k) => (first + k) * step);
-  const exponent = exponentOf(label, Math.max(Math.abs(first), Math.abs(last)) * step);
+  // 1099.995 mm rather than 1.099995 m.
+  const exponent = Math.min(exponentOf(label, Math.max(Math.abs(first), Math.abs(last)) * step), power < -4 ? -3 : Infinity);
   const texts = ticks.map((tick) => fixed(tick / 10 ** exponent, Math.max(0, exponent - power)));
   return { low: Math.min(low, first * step), high: Math.max(high, last * step), ticks, texts, exponent, title: prefixed(label, exponent) };
 }

@@ -25,7 +25,7 @@ setTimeout(async () => {
     return (!scroller || scroller === it) && it.getBoundingClientRect().right > room + 1;
   });
   document.body.dataset.result = JSON.stringify({
-    error: document.body.dataset.error || null, room, texts: drawn.length,
+    error: document.body.dataset.error || null, width: innerWidth, texts: drawn.length,
     clipped: clipped.map(({ text }) => text), overlapping: overlapping.map(({ text }) => text),
     outside: outside.map((it) => `${it.tagName} ${it.className} ${it.textContent.slice(0, 40)}`),
     axes: charts.map(({ axis }) => ({ title: axis.title, texts: axis.texts })),

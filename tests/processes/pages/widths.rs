@@ -21,7 +21,7 @@ pub(super) fn fits_every_width(page: &Path, cases: &str) -> Vec<Value> {
     let script = include_str!("widths.js").replace("CASES", cases);
     let found = browser.run_in_widths(page, &script, &WIDTHS);
     for (shown, width) in found.as_array().unwrap().iter().zip(WIDTHS) {
-        assert_eq!(shown["room"], width, "the frame must have its width");
+        assert_eq!(shown["width"], width, "the frame must have its width");
         assert!(shown["texts"].as_u64() > Some(20), "{shown}");
         for fault in ["clipped", "overlapping", "outside"] {
             assert_eq!(shown[fault], json!([]), "{fault} in {width} pixels");
@@ -74,7 +74,7 @@ fn a_page_fits_every_width_and_has_the_axes_of_the_pictures() {
         .collect();
     for shown in fits_every_width(&page, &json!(cases).to_string()) {
         let titles = axes(&shown);
-        assert_eq!(titles[1..4], ["x [m]", "y [mm]", "z [m]"], "{titles:?}");
+        assert_eq!(titles[1..4], ["x [mm]", "y [mm]", "z [m]"], "{titles:?}");
         assert!(titles.contains(&"force [kN]") && titles.contains(&"computation [µs]"), "{titles:?}");
         for ((label, low, high), computed) in cases.iter().zip(shown["computed"].as_array().unwrap()) {
             let axis = Axis::new(label, [*low, *high].into_iter(), 0.05, 5.0);
