@@ -182,7 +182,7 @@ function drawForces(pen, project, platform, forces) {
 
 function describe(angles, position, isKnown) {
   const line = (names, numbers, unitName, digits) =>
-    names.map((name, k) => `${name} ${numbers[k].toFixed(digits).replace("-", "−")} ${unitName}`).join(", ");
+    names.map((name, k) => `${name} ${fixed(numbers[k], digits)} ${unitName}`).join(", ");
   document.getElementById("pose").textContent = isKnown
     ? `${line(AXES, position.map((number) => 1000 * number), "mm", HEAD.machine.m_digits - 3)}\n${line(["alpha", "beta", "gamma"], angles, "°", HEAD.machine.deg_digits)}\n${intervalText(now)}`
     : `pose unknown; drawn at home\n\n${intervalText(now)}`;
