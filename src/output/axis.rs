@@ -196,7 +196,7 @@ mod tests {
         let share = |k: usize, ratio: f64| (k as f64 * ratio).fract();
         for k in 0..20_000 {
             let label = LABELS[k % LABELS.len()];
-            let sign = if k / 6 % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if (k / 6).is_multiple_of(2) { 1.0 } else { -1.0 };
             let middle = sign * 10f64.powf(12.0 * share(k, 0.754_877_666_246_692_7) - 8.0);
             let span = middle.abs() * 10f64.powf(6.0 * share(k, 0.569_840_290_998_053_2) - 5.0);
             let axis = Axis::new(label, [middle - span, middle + span].into_iter(), 0.05, 5.0);
