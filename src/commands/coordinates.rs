@@ -97,16 +97,26 @@ impl Coordinates {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
 
     const FRAMES: &str = "[[frame]]\nname = 'vertex'\nkind = 'tool'\npose = [0, 0, 0, 0.35, 0, 0]\n\
                           [[frame]]\nname = 'optics'\nkind = 'work'\npose = [0, 0, 1.5707963267948966, 1, 0, 0]\n";
 
+    fn config() -> Config {
+        Config::parse(&format!("{DEFAULT_CONFIG}\n{FRAMES}"), "a test").unwrap()
+    }
+
     fn coordinates(tool: Option<&str>, work: Option<&str>) -> Coordinates {
-        let config = Config::parse(&format!("{DEFAULT_CONFIG}\n{FRAMES}"), "a test").unwrap();
-        FrameOptions { tool: tool.map(Into::into), work: work.map(Into::into) }.coordinates(&config).unwrap()
+        FrameOptions { tool: tool.map(Into::into), work: work.map(Into::into) }
+            .coordinates(&config())
+            .unwrap()
+    }
+
+    /// A machine with home 1.1 m along x, and coordinates of a tool 0.35 m from it in a work frame that is turned.
+    pub fn framed() -> (Config, Coordinates) {
+        (config(), coordinates(Some("vertex"), Some("optics")))
     }
 
     #[test]

@@ -48,7 +48,8 @@ pub struct Series<'a> {
 }
 
 impl Series<'_> {
-    fn finite(&self) -> impl Iterator<Item = (f64, f64)> {
+    /// Points that can be drawn.
+    pub fn finite(&self) -> impl Iterator<Item = (f64, f64)> {
         // The bound also keeps differences of two values finite.
         self.points.iter().copied().filter(|(x, y)| x.abs() < 1e100 && y.abs() < 1e100)
     }
@@ -96,7 +97,7 @@ pub fn write_svg(path: &Path, title: &str, x_label: &str, panels: &[Panel]) -> R
 
 fn draw(root: &Area, title: &str, x_label: &str, panels: &[Panel]) -> Result<(), DrawError> {
     let series = || panels.iter().flat_map(|panel| &panel.series);
-    let x_axis = Axis::new(series().flat_map(Series::finite).map(|(x, _)| x), 0.0, 10.0);
+    let x_axis = Axis::new(x_label, series().flat_map(Series::finite).map(|(x, _)| x), 0.0, 10.0);
     let limit = SERIES_POINTS.min(CHART_POINTS / series().count().max(1)).max(2);
     let labels = panels.iter().flat_map(Panel::legend);
     let longest = labels.map(|series| text_width(series.label, LABEL_SIZE)).max();
@@ -107,10 +108,10 @@ fn draw(root: &Area, title: &str, x_label: &str, panels: &[Panel]) -> Result<(),
     let (_, mut rest) = root.split_vertically(title_height(title));
     for (index, panel) in panels.iter().enumerate() {
         // Only the lowest panel shows the numbers and the label of the shared axis.
-        let x_label = (index + 1 == panels.len()).then_some(x_label);
-        let (area, below) = rest.split_vertically(panel.height() + x_label.map_or(0, |_| X_LABELS));
+        let is_lowest = index + 1 == panels.len();
+        let (area, below) = rest.split_vertically(panel.height() + if is_lowest { X_LABELS } else { 0 });
         let (plot, legend) = area.split_horizontally(WIDTH - legend_width);
-        panel.draw_plot(&plot, &x_axis, x_label, limit)?;
+        panel.draw_plot(&plot, &x_axis, is_lowest, limit)?;
         panel.draw_legend(&legend, longest.unwrap_or_default())?;
         rest = below;
     }
@@ -126,19 +127,20 @@ impl Panel<'_> {
         PANEL_GAP + PLOT_HEIGHT.max(self.legend().count() as i32 * LEGEND_LINE)
     }
 
-    fn draw_plot(&self, area: &Area, x: &Axis, x_label: Option<&str>, limit: usize) -> Result<(), DrawError> {
-        let y = Axis::new(self.series.iter().flat_map(Series::finite).map(|(_, y)| y), 0.05, 8.0);
+    fn draw_plot(&self, area: &Area, x: &Axis, is_lowest: bool, limit: usize) -> Result<(), DrawError> {
+        let y =
+            Axis::new(self.y_label, self.series.iter().flat_map(Series::finite).map(|(_, y)| y), 0.05, 8.0);
         let mut chart = ChartBuilder::on(area)
             .margin_top(PANEL_GAP)
             .margin_left(MARGIN)
-            .x_label_area_size(x_label.map_or(TICK, |_| X_LABELS))
+            .x_label_area_size(if is_lowest { X_LABELS } else { TICK })
             .y_label_area_size(Y_LABELS)
             .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
-        let titles = [x_label.map_or(String::new(), |label| x.label(label)), y.label(self.y_label)];
+        let titles = [if is_lowest { x.title() } else { String::new() }, y.title()];
         let [x_title, y_title] = &titles;
         house_style(&mut mesh, [(x_title, WIDTH / 2), (y_title, PLOT_HEIGHT)]);
-        mesh.x_label_formatter(&|value| x_label.map_or(String::new(), |_| x.format_ext(value)))
+        mesh.x_label_formatter(&|value| if is_lowest { x.format_ext(value) } else { String::new() })
             .x_desc(x_title)
             .y_desc(y_title)
             .draw()?;

@@ -184,8 +184,11 @@ fn finish(svg: &str, height: i32) -> String {
     let number = |RGBColor(red, green, blue): RGBColor| u32::from_be_bytes([0, red, green, blue]);
     let rule = |part: &str, of: u32, rule: &str| format!("[{part}=\"#{of:06X}\"]{{{rule}}}");
     let paint = |part: &str, from: u32, to: u32| rule(part, from, &format!("{part}:#{to:06X}"));
-    let mut style =
-        String::from("text{font-family:Helvetica,Arial,sans-serif}polyline{stroke-linejoin:round}");
+    // Alone in a browser the picture has a dark page for its dark colours, and fits a narrow one.
+    let mut style = String::from(
+        "svg:root{color-scheme:light dark;max-width:100%;height:auto}text{font-family:Helvetica,Arial,sans-serif}\
+         polyline{stroke-linejoin:round}",
+    );
     style += &rule("stroke", DASHED_INK, DASH);
     let mut dark = paint("fill", INK, INK_ON_DARK) + &paint("stroke", INK, INK_ON_DARK);
     for index in 0..PALETTE.len() {

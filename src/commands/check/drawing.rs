@@ -108,15 +108,15 @@ impl View {
         (right * scale, up * scale)
     }
 
-    /// Titles of the axes of a parallel view, such as `x [m]`.
-    fn axis_titles(&self) -> Option<[String; 2]> {
-        let title = |axis: Vector3<f64>| {
+    /// Labels of the axes of a parallel view, such as `x [m]`.
+    fn axis_labels(&self) -> Option<[String; 2]> {
+        let label = |axis: Vector3<f64>| {
             let names = ["x [m]", "y [m]", "z [m]"];
             let sign = if axis.sum() < 0.0 { "\u{2212}" } else { "" };
             format!("{sign}{}", names.get(axis.iamax()).copied().unwrap_or_default())
         };
         let [right, up, _] = self.page;
-        self.eye_distance.is_infinite().then(|| [right, up].map(title))
+        self.eye_distance.is_infinite().then(|| [right, up].map(label))
     }
 
     fn draw(&self, area: &Area, joints: &[JointCentres; 2]) -> Result<(), DrawError> {
@@ -126,9 +126,12 @@ impl View {
             width as i32 - Y_LABELS - 3 * MARGIN - 2 * RADIUS,
             height as i32 - TITLE_HEIGHT - X_LABELS - MARGIN - 2 * RADIUS,
         ];
-        let axes = Axis::with_equal_scales(&points, BORDER, room.map(f64::from), TICKS);
-        let chart = draw_axes(area, self.title, axes, self.axis_titles())?;
-        if self.axis_titles().is_none() {
+        let labels = self.axis_labels();
+        let [x_label, y_label] =
+            labels.as_ref().map_or([""; 2], |labels| labels.each_ref().map(String::as_str));
+        let axes = Axis::with_equal_scales([x_label, y_label], &points, BORDER, room.map(f64::from), TICKS);
+        let chart = draw_axes(area, self.title, axes, labels.is_some())?;
+        if labels.is_none() {
             self.draw_base_axes(area)?;
         }
         let (left, top) = area.get_base_pixel();
@@ -168,12 +171,12 @@ impl View {
     }
 }
 
-/// Draws a coordinate system, with numbers and grid if its axes have titles.
+/// Draws a coordinate system, with or without numbers and grid.
 fn draw_axes<'a>(
     area: &Area<'a>,
     title: &str,
     [x, y]: [Axis; 2],
-    titles: Option<[String; 2]>,
+    has_grid: bool,
 ) -> Result<ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>, DrawError> {
     draw_title(area, title, 13)?;
     let mut chart = ChartBuilder::on(area)
@@ -182,8 +185,9 @@ fn draw_axes<'a>(
         .margin_right(2 * MARGIN)
         .x_label_area_size(X_LABELS)
         .y_label_area_size(Y_LABELS)
-        .build_cartesian_2d(x, y)?;
-    if let Some([x_title, y_title]) = titles {
+        .build_cartesian_2d(x.clone(), y.clone())?;
+    if has_grid {
+        let [x_title, y_title] = [x.title(), y.title()];
         let mut mesh = chart.configure_mesh();
         house_style(&mut mesh, [(&x_title, CELL_HEIGHT), (&y_title, CELL_HEIGHT)]);
         mesh.x_desc(x_title).y_desc(y_title).draw()?;
@@ -195,10 +199,9 @@ fn draw_axes<'a>(
 fn draw_strokes(area: &Area, machine: &Machine) -> Result<(), DrawError> {
     let lengths = leg_lengths(machine, &TaskState::at_rest(machine.home).motion().pose);
     let ends = [machine.actuator.min_length, machine.actuator.max_length];
-    let x = Axis::new(ends.into_iter().chain(lengths), 0.08, TICKS);
-    let y = Axis::new([0.5, LEGS as f64 + 0.5].into_iter(), 0.0, LEGS as f64).reversed();
-    let titles = Some(["length [m]", "leg"].map(String::from));
-    let mut chart = draw_axes(area, "stroke of each leg; discs: length at home", [x, y], titles)?;
+    let x = Axis::new("length [m]", ends.into_iter().chain(lengths), 0.08, TICKS);
+    let y = Axis::new("leg", [0.5, LEGS as f64 + 0.5].into_iter(), 0.0, LEGS as f64).reversed();
+    let mut chart = draw_axes(area, "stroke of each leg; discs: length at home", [x, y], true)?;
     for (index, length) in lengths.into_iter().enumerate() {
         let (leg, color) = (index as f64 + 1.0, palette(index));
         chart.draw_series([PathElement::new(ends.map(|end| (end, leg)), color.stroke_width(28))])?;

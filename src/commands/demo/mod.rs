@@ -46,7 +46,7 @@ const MAX_OVERHEAD_S: f64 = 20.0;
 /// Typical time from start to end beyond the motion itself, for the progress bar \[s\].
 const TYPICAL_OVERHEAD_S: f64 = 2.5;
 
-/// Files of a demonstration beside its pictures.
+/// Files of a demonstration.
 const RECORDING: &str = "recording.mcap";
 const PAGE: &str = "report.html";
 
@@ -76,9 +76,12 @@ pub struct DemoArguments {
     /// Write a JSON report
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Folder for the recording, its page and the pictures
+    /// Folder for the recording and its page
     #[arg(long, value_name = "FOLDER", default_value = "hexad-demo")]
     charts: PathBuf,
+    /// Write the charts also as pictures (SVG) into the folder
+    #[arg(long)]
+    pictures: bool,
 }
 
 impl DemoArguments {
@@ -134,9 +137,11 @@ fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     let tracking = recording.tracking();
     let mut report = Report::read(&stage.report)?;
     report.tracking = tracking.tracking();
-    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config, &recording)?;
     print(Summary { title: &stage.title, report: &report })?;
-    print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
+    if demo.pictures {
+        let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config, &recording)?;
+        print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
+    }
     if let Some(path) = &demo.report {
         report.write(path)?;
         print(format_args!("figures          {}\n", path.display()))?;

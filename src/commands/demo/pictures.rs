@@ -11,6 +11,7 @@ use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
+use crate::output::axis::{need_own_axes, range_of};
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use crate::output::svg::ChartError;
 
@@ -55,7 +56,8 @@ pub fn write_all(
         ),
     ] {
         let axes = if file == "trajectory.svg" { POSE_AXES } else { MOTION_AXES };
-        write(file, title, &[panel(angular, &axes, pair, 0..3), panel(linear, &axes, pair, 3..6)])?;
+        let angular = components(angular, &axes, pair, 0..3);
+        write(file, title, &[angular, components(linear, &axes, pair, 3..6)].concat())?;
     }
     for (file, title, label, pair) in [
         ("leg_lengths.svg", "lengths of the legs", "length [m]", [&commanded.length, &measured.length]),
@@ -67,7 +69,7 @@ pub fn write_all(
             [&commanded.accel, &measured.accel],
         ),
     ] {
-        write(file, title, &[panel(label, &LEG_NAMES, pair, 0..6)])?;
+        write(file, title, &components(label, &LEG_NAMES, pair, 0..6))?;
     }
     write_forces_and_errors(&signals, &mut write)?;
     Ok(written)
@@ -79,18 +81,12 @@ fn write_forces_and_errors(
     write: &mut impl FnMut(&'static str, &str, &[Panel]) -> Result<(), ChartError>,
 ) -> Result<(), ChartError> {
     let difference = LEG_NAMES.iter().zip(force_difference).enumerate();
+    let difference = difference.map(|(k, (name, points))| vec![line(name, points, LineStyle::Solid, k)]);
+    let forces = components("force [N]", &LEG_NAMES, [&commanded.force, &measured.force], 0..6);
     write(
         "forces.svg",
         "actuator forces, applied and (dashed) by inverse dynamics of the setpoint",
-        &[
-            panel("force [N]", &LEG_NAMES, [&commanded.force, &measured.force], 0..6),
-            Panel {
-                y_label: "applied - commanded [N]",
-                series: difference
-                    .map(|(k, (name, points))| line(name, points, LineStyle::Solid, k))
-                    .collect(),
-            },
-        ],
+        &[forces, readable("applied - commanded [N]", difference.collect())].concat(),
     )?;
     let error = |label, lines, color| Panel {
         y_label: label,
@@ -100,7 +96,7 @@ fn write_forces_and_errors(
     write(
         "tracking_error.svg",
         "desired minus true pose",
-        &[error("position [µm]", position, 0), error("orientation [µrad]", orientation, 1)],
+        &[error("position [m]", position, 0), error("orientation [rad]", orientation, 1)],
     )
 }
 
@@ -108,22 +104,36 @@ const POSE_AXES: [&str; 6] = ["alpha", "beta", "gamma", "x", "y", "z"];
 const MOTION_AXES: [&str; 6] = ["x", "y", "z", "x", "y", "z"];
 const LEG_NAMES: [&str; 6] = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
 
-fn panel<'a>(
+/// Panels of components, measured and (dashed) commanded.
+fn components<'a>(
     y_label: &'a str,
     names: &[&'a str; 6],
     [commanded, measured]: [&'a Lines; 2],
     which: core::ops::Range<usize>,
-) -> Panel<'a> {
-    let count = which.len();
-    let curves = || names.iter().zip(measured.iter().zip(commanded));
-    // Colours count from the first curve of the panel, so an axis has the same colour in all panels.
-    let rows = || curves().skip(which.start).take(count).enumerate();
-    let solid = rows().map(|(k, (name, (lines, _)))| line(name, lines, LineStyle::Solid, k));
-    // One entry of the legend for all dashed lines.
-    let dashed = rows().map(|(k, (_, (_, lines)))| {
-        line(if k + 1 == count { "commanded" } else { "" }, lines, LineStyle::Dashed, k)
+) -> Vec<Panel<'a>> {
+    let (count, first) = (which.len(), which.start);
+    let curves = names.iter().zip(measured.iter().zip(commanded)).skip(first).take(count);
+    // Colours count from the first component, so an axis has the same colour in all pictures.
+    let lines = curves.enumerate().map(|(k, (name, (measured, commanded)))| {
+        vec![line(name, measured, LineStyle::Solid, k), line("commanded", commanded, LineStyle::Dashed, k)]
     });
-    Panel { y_label, series: solid.chain(dashed).collect() }
+    readable(y_label, lines.collect())
+}
+
+/// One panel of all components, or one of each if a common axis would hide one of them.
+fn readable<'a>(y_label: &'a str, components: Vec<Vec<Series<'a>>>) -> Vec<Panel<'a>> {
+    let values = |lines: &Vec<Series>| range_of(lines.iter().flat_map(Series::finite).map(|(_, y)| y));
+    if need_own_axes(&components.iter().map(values).collect::<Vec<_>>()) {
+        return components.into_iter().map(|series| Panel { y_label, series }).collect();
+    }
+    let mut series = components.concat();
+    // One entry of the legend for all dashed lines.
+    let mut dashed = series.iter_mut().rev().filter(|series| series.style == LineStyle::Dashed);
+    dashed.next();
+    dashed.for_each(|series| series.label = "");
+    // In the order of the legend.
+    series.sort_by_key(|series| series.style == LineStyle::Dashed);
+    vec![Panel { y_label, series }]
 }
 
 fn line<'a>(label: &'a str, points: &'a [(f64, f64)], style: LineStyle, color: usize) -> Series<'a> {
@@ -137,7 +147,7 @@ struct Signals {
     measured: Curves,
     /// Applied minus commanded force, at the instants of the applied force \[N\].
     force_difference: Lines,
-    /// Norms: position \[um\], orientation \[urad\].
+    /// Norms: position \[m\], orientation \[rad\].
     tracking: [Vec<(f64, f64)>; 2],
 }
 
@@ -206,8 +216,8 @@ impl Signals {
             let t = seconds(message.header.time_ns);
             let error = measured_pose(message).displacement_to(&desired.motion().pose);
             let [position, orientation] = tracking;
-            position.push((t, error.linear.norm() * 1e6));
-            orientation.push((t, error.angular.norm() * 1e6));
+            position.push((t, error.linear.norm()));
+            orientation.push((t, error.angular.norm()));
         }
         signals
     }

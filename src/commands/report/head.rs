@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::history::{Bars, History};
@@ -10,6 +11,7 @@ use super::run::Run;
 use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
 use super::track::Track;
+use crate::commands::coordinates::Coordinates;
 use crate::config::Config;
 use crate::control::signals::state::State;
 use crate::model::LEGS;
@@ -31,6 +33,8 @@ struct Head<'a> {
     /// Description of the samples.
     kept: &'a str,
     states: [&'static str; 7],
+    /// Text of what angles and positions describe; empty for the platform in the base frame.
+    coordinates: &'a str,
     machine: MachineHead,
     configuration: &'a str,
     #[serde(flatten)]
@@ -63,7 +67,7 @@ pub struct LevelHead {
     pub samples: u64,
 }
 
-/// The machine as the page draws it.
+/// The machine as the page draws it: joints on the base in the work frame, joints on the platform in the tool frame.
 #[derive(Serialize)]
 struct MachineHead {
     base: [[f64; 3]; LEGS],
@@ -94,16 +98,16 @@ pub fn of_recording(run: &Run, extents: &[Extent], kept: &str) -> String {
         levels,
         kept,
         configuration: &configuration,
-        ..head(config, events)
+        ..head(config, &Coordinates::default(), events)
     })
 }
 
-/// Head of a page with data from a server.
-pub fn of_live(config: &Config) -> String {
-    json(&Head { is_live: true, ..head(config, Events::default()) })
+/// Head of a page with data from a server, in these coordinates.
+pub fn of_live(config: &Config, coordinates: &Coordinates) -> String {
+    json(&Head { is_live: true, ..head(config, coordinates, Events::default()) })
 }
 
-fn head<'a>(config: &'a Config, run: Events<'a>) -> Head<'a> {
+fn head<'a>(config: &'a Config, coordinates: &'a Coordinates, run: Events<'a>) -> Head<'a> {
     let begins = SIGNALS.iter().scan(0, |next, (name, components)| {
         let first = *next;
         *next += components;
@@ -120,23 +124,50 @@ fn head<'a>(config: &'a Config, run: Events<'a>) -> Head<'a> {
         levels: vec![],
         kept: "",
         states: State::ALL.map(State::name),
-        machine: machine(config),
+        coordinates: &coordinates.label,
+        machine: machine(config, coordinates),
         configuration: &config.text,
         run,
     }
 }
 
-fn machine(config: &Config) -> MachineHead {
+fn machine(config: &Config, coordinates: &Coordinates) -> MachineHead {
     let machine = &config.machine;
-    let joints = &machine.joints;
+    let (joints, frames) = (&machine.joints, coordinates.frames());
     let [base, platform] =
-        [&joints.base, &joints.platform].map(|lanes| joints.triples.unpack_vectors(lanes).map(Into::into));
+        [(&joints.base, &frames.work), (&joints.platform, &frames.tool)].map(|(lanes, frame)| {
+            let in_frame = |joint: Vector3<f64>| frame.rotation.tr_mul(&(joint - frame.position)).into();
+            joints.triples.unpack_vectors(lanes).map(in_frame)
+        });
     let MotionDigits { mm, deg } = MotionDigits::new(config.resolution());
-    let gravity = machine.gravity.into();
-    MachineHead { base, platform, home: machine.home, gravity, m_digits: mm + 1, deg_digits: deg }
+    let gravity = frames.work.rotation.tr_mul(&machine.gravity).into();
+    let home = coordinates.tool_x(&machine.home);
+    MachineHead { base, platform, home, gravity, m_digits: mm + 3, deg_digits: deg }
 }
 
 /// Text as JSON. Numbers without a value are null.
 pub fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::coordinates::tests::framed;
+    use crate::model::inverse_geometry::leg_lengths;
+    use crate::model::task::TaskState;
+
+    #[test]
+    fn a_machine_in_other_frames_has_the_same_legs() {
+        let (config, coordinates) = framed();
+        let lengths = leg_lengths(&config.machine, &config.machine.home_pose());
+        for coordinates in [coordinates, Coordinates::default()] {
+            let MachineHead { base, platform, home, .. } = machine(&config, &coordinates);
+            let home = TaskState::at_rest(home).motion().pose;
+            for ((base, platform), length) in base.iter().zip(platform).zip(lengths) {
+                let leg = home.position + home.rotation * Vector3::from(platform) - Vector3::from(*base);
+                assert!((leg.norm() - length).abs() < 1e-12, "{} {length}", leg.norm());
+            }
+        }
+    }
 }

@@ -6,6 +6,7 @@ use super::ReportError;
 use super::history::History;
 use super::levels::{self, Level};
 use super::signals::{CycleInstants, Signals};
+use crate::commands::coordinates::Coordinates;
 use crate::config::Config;
 use crate::config::changes::changes;
 use crate::recording::reader::{Recording, Summary};
@@ -116,7 +117,8 @@ impl Run {
         let mut levels: Vec<_> = extents.into_iter().map(Level::new).collect();
         let mut last = 0;
         for Part { config, files, .. } in self.parts() {
-            let mut signals = Signals::new(&config.machine, CycleInstants::of_controller(config));
+            let mut signals =
+                Signals::new(&config.machine, CycleInstants::of_controller(config), Coordinates::default());
             for file in files {
                 Recording::open(file)?.each(|item| {
                     if let Item::Cycle(cycle) = item

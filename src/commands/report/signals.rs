@@ -1,6 +1,7 @@
-//! Signals of a page: numbers of one cycle, in the units in which they are drawn.
+//! Signals of a page: numbers of one cycle, in SI units, angles in degrees.
 
 use super::references::References;
+use crate::commands::coordinates::Coordinates;
 use crate::config::Config;
 use crate::control::signals::time::seconds_between;
 use crate::daemon::nanoseconds;
@@ -75,6 +76,7 @@ impl CycleInstants {
 pub struct Signals<'a> {
     machine: &'a Machine,
     instants: CycleInstants,
+    coordinates: Coordinates,
     references: References,
     model: InverseDynamics,
     /// Previous cycle: instant of the measurement \[ns\], twist, rates of the legs.
@@ -82,10 +84,11 @@ pub struct Signals<'a> {
 }
 
 impl<'a> Signals<'a> {
-    /// Signals of a machine.
-    pub fn new(machine: &'a Machine, instants: CycleInstants) -> Self {
+    /// Signals of a machine. Angles and positions are coordinates of a tool in a work frame; all other signals are of the
+    /// platform in the base frame.
+    pub fn new(machine: &'a Machine, instants: CycleInstants, coordinates: Coordinates) -> Self {
         let model = InverseDynamics::new(machine);
-        Self { machine, instants, references: References::default(), model, before: None }
+        Self { machine, instants, coordinates, references: References::default(), model, before: None }
     }
 
     /// Row of a cycle. Accelerations are differences from the previous measurement.
@@ -94,7 +97,7 @@ impl<'a> Signals<'a> {
         let output = cycle.output().unwrap_or_default();
         let home = &self.machine.home;
         let none = [f64::NAN; 6];
-        let coordinates = |pose: &Pose| degrees(task_coordinates(pose, home));
+        let coordinates = |pose: &Pose| degrees(self.coordinates.tool_x(&task_coordinates(pose, home)));
         let platform = output.platform.as_ref();
         let CycleInstants { reference_ns, force_ns } = self.instants;
         self.references.add(cycle.release_ns + reference_ns, output.reference.as_ref());
@@ -139,14 +142,14 @@ impl<'a> Signals<'a> {
         row.six(applied.zip(computed).map(|(applied, computed)| difference(applied, computed)));
 
         let error = output.error.map(|error| norms(&error.pose));
-        row.one(error.map(|(position, _)| position * 1e6));
-        row.one(error.map(|(_, orientation)| orientation * 1e6));
+        row.one(error.map(|(position, _)| position));
+        row.one(error.map(|(_, orientation)| orientation));
         row.one(platform.map(|it| it.condition));
-        row.one(Some(cycle.wakeup_ns as f64 * 1e-3));
-        row.one(Some(cycle.compute_ns as f64 * 1e-3));
-        let age_ms = |time_ns: u64| 1e3 * seconds_between(time_ns, cycle.release_ns);
-        row.one(has_measurement.then(|| age_ms(cycle.measured_time_ns)));
-        row.one((cycle.has_setpoint == 1).then(|| age_ms(cycle.setpoint_time_ns)));
+        row.one(Some(cycle.wakeup_ns as f64 * 1e-9));
+        row.one(Some(cycle.compute_ns as f64 * 1e-9));
+        let age_s = |time_ns: u64| seconds_between(time_ns, cycle.release_ns);
+        row.one(has_measurement.then(|| age_s(cycle.measured_time_ns)));
+        row.one((cycle.has_setpoint == 1).then(|| age_s(cycle.setpoint_time_ns)));
         row.finish()
     }
 }
@@ -208,6 +211,7 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::coordinates::tests::framed;
     use crate::control::controller::Output;
     use crate::control::sensing::localization::PlatformState;
     use crate::control::signals::inputs::{Input, Measurement};
@@ -226,7 +230,7 @@ mod tests {
         let text = include_str!("../../../config/fried2008.toml");
         let config = Config::parse(&format!("{text}\n[realtime]\nrate_hz = 1000\n"), "a test").unwrap();
         let instants = CycleInstants::of_controller(&config);
-        let mut signals = Signals::new(&config.machine, instants);
+        let mut signals = Signals::new(&config.machine, instants, Coordinates::default());
         let motion = |time_ns: u64| {
             let mut state = TaskState::at_rest(config.machine.home);
             let (w, t) = (5.0, time_ns as f64 * 1e-9);
@@ -275,6 +279,28 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn angles_and_positions_are_those_of_the_tool_in_the_work_frame() {
+        let (config, coordinates) = framed();
+        let platform = Some(PlatformState {
+            pose: config.machine.home_pose(),
+            twist: Twist::default(),
+            condition: 1.0,
+            time_to_singularity: f64::INFINITY,
+        });
+        let reference = Some(TaskState::at_rest(config.machine.home).motion());
+        let output = Output { platform, reference, ..Output::default() };
+        let mut signals = Signals::new(&config.machine, CycleInstants::default(), coordinates);
+        let row = signals.row(&CycleMessage::new(&Input::default(), &output));
+        for (angle, position) in [("angle", "position"), ("angle_ref", "position_ref")] {
+            let [angles, positions] = [angle, position].map(|name| &row[column(name)..column(name) + 3]);
+            assert!(
+                (angles[2] + 90.0).abs() < 1e-5 && (positions[1] + 0.45).abs() < 1e-6,
+                "{angles:?} {positions:?}"
+            );
         }
     }
 

@@ -6,6 +6,7 @@ use super::history::History;
 use super::run::Run;
 use crate::config::Config;
 use crate::messages::Times;
+use crate::output::axis::{exponent_of, prefixed};
 
 /// Largest number of faults described. The time axis shows all.
 const MAX_FAULTS: usize = 20;
@@ -155,13 +156,11 @@ fn thousands(number: u64) -> String {
     text
 }
 
-/// Number with a prefix of its unit.
+/// Quantity with three digits and the prefix of its unit.
 fn scaled(value: f64, unit: &str) -> String {
-    let (factor, prefix) = [(1.0, ""), (1e3, "m"), (1e6, "µ")]
-        .into_iter()
-        .find(|(factor, _)| value * factor >= 1.0)
-        .unwrap_or((1e9, "n"));
-    let number = value * factor;
+    let label = format!("[{unit}]");
+    let exponent = exponent_of(&label, value);
+    let number = value / 10f64.powi(exponent);
     let digits = if number >= 100.0 {
         0
     } else if number >= 10.0 {
@@ -169,7 +168,7 @@ fn scaled(value: f64, unit: &str) -> String {
     } else {
         2
     };
-    format!("{number:.digits$} {prefix}{unit}")
+    format!("{number:.digits$} {}", prefixed(&label, exponent).trim_matches(['[', ']']))
 }
 
 #[cfg(test)]
@@ -180,6 +179,6 @@ mod tests {
     fn numbers_are_written_as_people_read_them() {
         assert_eq!([1.5, 61.24, 3599.97].map(duration), ["1.500 s", "1 min 1.2 s", "1 h 0 min 0 s"]);
         assert_eq!([7, 1234, 3_600_000].map(thousands), ["7", "1\u{202f}234", "3\u{202f}600\u{202f}000"]);
-        assert_eq!([1.4e-7, 2.5e-3, 0.0].map(|value| scaled(value, "m")), ["140 nm", "2.50 mm", "0.00 nm"]);
+        assert_eq!([1.4e-7, 2.5e-3, 0.0].map(|value| scaled(value, "m")), ["140 nm", "2.50 mm", "0.00 m"]);
     }
 }

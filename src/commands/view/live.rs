@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
+use crate::commands::coordinates::Coordinates;
 use crate::commands::report::head::json;
 use crate::commands::report::history::{Bars, History};
 use crate::commands::report::levels::{Extent, Level};
@@ -26,6 +27,7 @@ const INTERVALS_S: f64 = 120.0;
 /// State of the live page.
 pub struct Live<'a> {
     config: &'a Config,
+    coordinates: Coordinates,
     history: History,
     signals: Signals<'a>,
     /// Cycles per sample.
@@ -56,14 +58,15 @@ struct Fresh<'a> {
 }
 
 impl<'a> Live<'a> {
-    /// Live page before the first cycle.
-    pub fn new(config: &'a Config) -> Self {
+    /// Live page before the first cycle, with these coordinates.
+    pub fn new(config: &'a Config, coordinates: Coordinates) -> Self {
         let rate_hz = config.deployment.realtime.rate_hz;
         Self {
             config,
             history: History::new(config),
             // The reference is the setpoint at the release.
-            signals: Signals::new(&config.machine, CycleInstants::default()),
+            signals: Signals::new(&config.machine, CycleInstants::default(), coordinates.clone()),
+            coordinates,
             step: (SAMPLE_S * rate_hz).round().max(1.0) as u64,
             pair: None,
             pairs: VecDeque::new(),
@@ -77,7 +80,7 @@ impl<'a> Live<'a> {
     pub fn add(&mut self, cycle: &CycleMessage, status: &StatusMessage) {
         if status.counters.cycles < self.counters.cycles {
             // Another daemon has begun.
-            *self = Self { run: self.run + 1, ..Self::new(self.config) };
+            *self = Self { run: self.run + 1, ..Self::new(self.config, self.coordinates.clone()) };
         }
         // The times belong to other cycles. They are shown but not counted.
         let untimed = CycleMessage { wakeup_ns: 0, compute_ns: 0, ..*cycle };

@@ -13,6 +13,7 @@ use self::live::Live;
 use self::server::{Reply, Server};
 use self::topics::Topics;
 use super::arguments::MachineFile;
+use super::coordinates::{Coordinates, FrameOptions};
 use super::failure::{CommandError, Failure};
 use super::report::head;
 use crate::config::Config;
@@ -36,6 +37,8 @@ pub struct ViewArguments {
     /// Port on 127.0.0.1 [default: any that is free]
     #[arg(long, default_value_t = 0, hide_default_value = true)]
     port: u16,
+    #[command(flatten)]
+    frames: FrameOptions,
 }
 
 /// The page cannot be served.
@@ -63,15 +66,18 @@ impl CommandError for ForeignDaemon {}
 impl ViewArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
+        let coordinates = self.frames.coordinates(&config)?;
         let mut topics = Topics::join(&config)?;
         check_user(&config.name)?;
-        let live = Mutex::new(Live::new(&config));
+        let live = Mutex::new(Live::new(&config, coordinates.clone()));
         let server = Server::start(self.port).map_err(|cause| ViewError { port: self.port, cause })?;
         print(format_args!("{}\n", server.address()))?;
         eprintln!("hexad: open this address in a browser on this host; Ctrl-C ends it");
         std::thread::scope(|scope| {
             for _ in 0..server::THREADS {
-                scope.spawn(|| server.serve(&stop, |path, query| reply(&config, &live, path, query)));
+                scope.spawn(|| {
+                    server.serve(&stop, |path, query| reply(&config, &coordinates, &live, path, query))
+                });
             }
             while !stop.is_requested() {
                 let cycles = topics.cycles();
@@ -100,13 +106,19 @@ fn check_user(machine: &str) -> Result<(), ForeignDaemon> {
 }
 
 /// Reply to a path and its query.
-fn reply(config: &Config, live: &Mutex<Live>, path: &str, query: &[(&str, &str)]) -> Option<Reply> {
+fn reply(
+    config: &Config,
+    coordinates: &Coordinates,
+    live: &Mutex<Live>,
+    path: &str,
+    query: &[(&str, &str)],
+) -> Option<Reply> {
     match path {
         "/" => {
             let title = format!("{}: live", config.name);
             Some(Reply {
                 kind: "text/html; charset=utf-8",
-                content: page(PageKind::Live, &title, &head::of_live(config), &[]),
+                content: page(PageKind::Live, &title, &head::of_live(config, coordinates), &[]),
             })
         }
         "/data" => {

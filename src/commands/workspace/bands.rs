@@ -83,14 +83,27 @@ fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     }
 }
 
-/// Threshold with at most three digits.
-pub fn plain(x: f64) -> String {
-    format!("{}", format!("{x:.2e}").parse().unwrap_or(x))
+/// Thresholds as text, with the fewest digits from three on with which they differ.
+pub fn distinct_texts(thresholds: &[f64]) -> Vec<String> {
+    let texts = |digits| thresholds.iter().map(|x| plain(*x, digits)).collect::<Vec<_>>();
+    let differ = |texts: &Vec<String>| texts.windows(2).all(|pair| pair.first() != pair.last());
+    (3..=17).map(texts).find(differ).unwrap_or_default()
+}
+
+/// Number with at most so many digits.
+pub fn plain(x: f64, digits: usize) -> String {
+    // The worst threshold of a quantity that must be above zero.
+    if x.abs() < 1e-300 {
+        "0".into()
+    } else {
+        format!("{}", format!("{x:.*e}", digits - 1).parse().unwrap_or(x))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::random::Random;
 
     #[test]
     fn numbers_are_round_and_few() {
@@ -108,6 +121,36 @@ mod tests {
                 assert!(numbers.is_sorted());
             }
         }
-        assert_eq!([0.15000000000000002, 100.0, 1234.0].map(plain), ["0.15", "100", "1230"]);
+        assert_eq!([0.15000000000000002, 100.0, 1234.0].map(|x| plain(x, 3)), ["0.15", "100", "1230"]);
+    }
+
+    #[test]
+    fn thresholds_differ_as_text_over_twelve_decades() {
+        let mut random = Random::new(2);
+        for k in 0..5000 {
+            let low = 10f64.powf(12.0 * random.uniform() - 6.0);
+            let high = low * (1.0 + 10f64.powf(8.0 * random.uniform() - 6.0));
+            let worst = if k % 2 == 0 { 0.7 * low } else { 1.5 * high };
+            let [lower, higher] = [(Better::Lower, worst), (Better::Higher, 0.0)].map(|(better, worst)| {
+                let max_force = f64::INFINITY;
+                let value = |quality: &PoseQuality| quality.condition;
+                let quantity = Quantity { label: "", value, better, worst, max_force };
+                let quality = |condition| PoseQuality {
+                    condition,
+                    stroke_margin: 1.0,
+                    determinant: 1.0,
+                    worst_force: 1.0,
+                    payload: 1.0,
+                };
+                distinct_texts(&quantity.thresholds([quality(low), quality(high)].iter()))
+            });
+            for texts in [lower, higher] {
+                let all: std::collections::BTreeSet<_> = texts.iter().collect();
+                assert!(
+                    all.len() == texts.len() && !texts.concat().contains('e'),
+                    "{low} to {high}: {texts:?}"
+                );
+            }
+        }
     }
 }

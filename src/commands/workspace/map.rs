@@ -5,11 +5,11 @@ use std::path::Path;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::bands::{MAX_BANDS, Quantity, plain};
+use super::bands::{MAX_BANDS, Quantity, distinct_texts};
 use super::map_content::{LegendSample, MapLine, in_unit};
 use super::slice::Slice;
 use crate::model::machine::Machine;
-use crate::output::axis::Axis;
+use crate::output::axis::{Axis, exponent_of, prefixed};
 use crate::output::svg::{
     Area, ChartError, DrawError, GRID, LABEL_SIZE, MARGIN, SAMPLE, TITLE_HEIGHT, UNIT, X_LABELS, Y_LABELS,
     draw_title, fitted_text, house_style, legend_rows, rgb, text, write_picture,
@@ -76,8 +76,11 @@ impl MapDrawing<'_> {
         let right = BAR_WIDTH + BAR_LABEL_WIDTH + 2 * MARGIN;
         let (width, height) = area.dim_in_pixel();
         let middle = (MARGIN + Y_LABELS + width as i32 - right) / 2;
-        let label = fitted_text(&[(quantity.label, width as i32)], 13, HPos::Center);
-        area.draw_text(quantity.label, &label, (middle, TITLE_HEIGHT * 3 / 5))?;
+        let thresholds = quantity.thresholds(slice.qualities.iter().filter(|quality| quality.within_reach()));
+        let exponent = exponent_of(quantity.label, thresholds.iter().copied().fold(0.0, f64::max));
+        let title = prefixed(quantity.label, exponent);
+        let label = fitted_text(&[(&title, width as i32)], 13, HPos::Center);
+        area.draw_text(&title, &label, (middle, TITLE_HEIGHT * 3 / 5))?;
         let room = [
             f64::from(width as i32 - MARGIN - Y_LABELS - right),
             f64::from(height as i32 - TITLE_HEIGHT - X_LABELS - MARGIN),
@@ -92,12 +95,10 @@ impl MapDrawing<'_> {
             .y_label_area_size(Y_LABELS)
             .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
-        let [x_label, y_label] = slice.plane.0.map(axis_label);
-        let [x_label, y_label] = [x.label(&x_label), y.label(&y_label)];
+        let [x_label, y_label] = [x.title(), y.title()];
         house_style(&mut mesh, [(&x_label, width as i32 - Y_LABELS), (&y_label, CELL_HEIGHT - X_LABELS)]);
         mesh.x_desc(x_label).y_desc(y_label).draw()?;
 
-        let thresholds = quantity.thresholds(slice.qualities.iter().filter(|quality| quality.within_reach()));
         let beyond = rgb(BEYOND_LIMIT).mix(0.4).filled();
         let bands: Vec<_> = thresholds.iter().zip(colors(thresholds.len())).collect();
         let reach = (f64::NAN, beyond);
@@ -118,14 +119,17 @@ impl MapDrawing<'_> {
         if (start..end).contains(&home.0) && (top..bottom).contains(&home.1) {
             draw_home(area, home, slice.through == self.machine.home)?;
         }
-        draw_bar(area, (end + 2 * MARGIN, top, bottom), &bands)
+        let scaled: Vec<_> = thresholds.iter().map(|threshold| threshold / 10f64.powi(exponent)).collect();
+        let labels = distinct_texts(&scaled);
+        let colors: Vec<_> = labels.iter().zip(colors(labels.len())).collect();
+        draw_bar(area, (end + 2 * MARGIN, top, bottom), &colors)
     }
 }
 
 /// Name and unit of an axis, such as `x [m]`.
-fn axis_label(axis: usize) -> String {
+fn axis_label(axis: usize) -> &'static str {
     let names = ["alpha [deg]", "beta [deg]", "gamma [deg]", "x [m]", "y [m]", "z [m]"];
-    names.get(axis).copied().unwrap_or_default().into()
+    names.get(axis).copied().unwrap_or_default()
 }
 
 /// Both axes, with equal scales if they have the same unit.
@@ -133,10 +137,12 @@ fn axes(slice: &Slice, room: [f64; 2]) -> [Axis; 2] {
     let [(left, right), (bottom, top)] = slice.ranges;
     let (low, high) = (in_unit(slice, [left, bottom]), in_unit(slice, [right, top]));
     let [first, second] = slice.plane.0;
+    let [right, up] = slice.plane.0.map(axis_label);
     if (first < 3) == (second < 3) {
-        return Axis::with_equal_scales(&[low, high], 0.0, room, TICK_COUNT);
+        return Axis::with_equal_scales([right, up], &[low, high], 0.0, room, TICK_COUNT);
     }
-    [(low.0, high.0), (low.1, high.1)].map(|(low, high)| Axis::new([low, high].into_iter(), 0.0, TICK_COUNT))
+    [(right, low.0, high.0), (up, low.1, high.1)]
+        .map(|(label, low, high)| Axis::new(label, [low, high].into_iter(), 0.0, TICK_COUNT))
 }
 
 /// Given number of colours, from bad to good.
@@ -191,14 +197,15 @@ fn draw_home(area: &Area, at: (i32, i32), on_slice: bool) -> Result<(), DrawErro
 fn draw_bar(
     area: &Area,
     (left, top, bottom): (i32, i32, i32),
-    bands: &[(&f64, u32)],
+    bands: &[(&String, u32)],
 ) -> Result<(), DrawError> {
     let height = |k: usize| bottom - (bottom - top) * k as i32 / bands.len().max(1) as i32;
-    for (k, (threshold, color)) in bands.iter().enumerate() {
+    let rooms: Vec<_> = bands.iter().map(|(label, _)| (label.as_str(), BAR_LABEL_WIDTH)).collect();
+    let style = fitted_text(&rooms, LABEL_SIZE, HPos::Left);
+    for (k, (label, color)) in bands.iter().enumerate() {
         let corners = [(left, height(k + 1)), (left + BAR_WIDTH, height(k))];
         area.draw(&Rectangle::new(corners, rgb(*color).filled()))?;
-        let label = if **threshold == f64::MIN_POSITIVE { "0".into() } else { plain(**threshold) };
-        area.draw_text(&label, &text(12, HPos::Left), (left + BAR_WIDTH + MARGIN, height(k)))?;
+        area.draw_text(label, &style, (left + BAR_WIDTH + MARGIN, height(k)))?;
     }
     Ok(())
 }

@@ -42,8 +42,8 @@ impl MapDrawing<'_> {
         };
         [
             Quantity {
-                label: "stroke margin [mm]",
-                value: |quality| 1e3 * quality.stroke_margin,
+                label: "stroke margin [m]",
+                value: |quality| quality.stroke_margin,
                 better: Better::Higher,
                 worst: 0.0,
                 max_force: f64::INFINITY,
@@ -79,8 +79,8 @@ impl MapDrawing<'_> {
             return "home".into();
         }
         let [a, b, c, x, y, z] = slice.through;
-        let [a, b, c] = [a, b, c].map(|angle| plain(angle.to_degrees()));
-        let [x, y, z] = [x, y, z].map(plain);
+        let [a, b, c] = [a, b, c].map(|angle| plain(angle.to_degrees(), 3));
+        let [x, y, z] = [x, y, z].map(|x| plain(x, 3));
         format!("{a}, {b}, {c} deg, {x}, {y}, {z} m")
     }
 

@@ -1,9 +1,18 @@
 // Charts over time. All share the range of time and the instant of the cursor.
 
-const Y_AXIS_PX = 78;
+const Y_AXIS_PX = 84;
 const RIGHT_PX = 22;
-const CHART_HEIGHT_PX = 190;
-const charts = [];
+const PLOT_HEIGHT_PX = 152;
+// Height of each of the plots of a panel whose components have axes of their own.
+const SMALL_PLOT_PX = 84;
+// Number of ticks of an axis of values at most; there are two at least.
+const VALUE_TICKS = 5;
+// Below the plot: numbers, and the label of the time.
+const NUMBERS_PX = 28;
+const LABEL_PX = 18;
+const panels = [];
+// The charts of all panels.
+let charts = [];
 
 const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
@@ -13,37 +22,13 @@ function element(name, properties = {}, ...children) {
   return made;
 }
 
-// Values that differ by less than this share of their size are equal: numbers of four bytes have seven digits.
-const EQUAL_SHARE = 1e-6;
-// Smaller values are rounding errors.
-const LEAST_VALUE = 1e-9;
-
-// Range of the values with a border; a band around a constant.
-function valueRange(_, low, high) {
-  if (low === null || high === null || low === undefined) return [0, 1];
-  const size = Math.max(Math.abs(low), Math.abs(high));
-  if (size < LEAST_VALUE) return [-1, 1];
-  const border = high - low < EQUAL_SHARE * size ? 0.05 * size : 0.06 * (high - low);
-  return [low - border, high + border];
-}
-
-function axes(label) {
-  const values = (_, ticks) => ticks.map(tickText);
+function axes(xAxis, yAxis) {
+  const font = "12px system-ui, sans-serif";
   const common = {
-    stroke: () => color("ink"), font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif",
+    stroke: () => color("ink"), font, labelFont: font, labelSize: LABEL_PX, labelGap: 0,
     grid: { stroke: () => color("grid"), width: 1 }, ticks: { stroke: () => color("grid"), width: 1, size: 5 },
   };
-  return [
-    { ...common, values, label: "time [s]", labelSize: 18, size: 30, labelGap: 0 },
-    { ...common, values, label, labelSize: 18, size: Y_AXIS_PX - 18, labelGap: 2 },
-  ];
-}
-
-// Text of a tick, without the rounding errors of its sum.
-function tickText(number) {
-  const size = Math.abs(number);
-  if (size >= 1e6 || (size > 0 && size < 1e-4)) return number.toExponential(1).replace("-", "−");
-  return String(Number(number.toFixed(6))).replace("-", "−");
+  return [{ ...common, size: NUMBERS_PX, ...xAxis }, { ...common, size: Y_AXIS_PX, ...yAxis }];
 }
 
 // Style of a line on top of others.
@@ -51,13 +36,13 @@ const DASHED = { width: 1, dash: [4, 4], stroke: () => color("ink"), alpha: 0.8 
 
 // Series of a panel: first what was measured or applied, then the references on top of them.
 function seriesOf(panel) {
-  const first = HEAD.columns[panel.signal];
+  const first = HEAD.columns[panel.signal] + (panel.first || 0);
   const measured = panel.names.map((name, k) => ({
     column: first + k, color: k + (panel.color || 0), label: name, width: 2, stroke: () => color(`c${k + (panel.color || 0)}`),
     ...(k === panel.dashed ? DASHED : {}),
   }));
   if (!panel.reference) return measured;
-  const reference = HEAD.columns[panel.reference];
+  const reference = HEAD.columns[panel.reference] + (panel.first || 0);
   return measured.concat(panel.names.map((name, k) => ({ column: reference + k, label: `${name}, reference`, ...DASHED })));
 }
 
@@ -84,20 +69,73 @@ function legendOf(panel, series, toggle) {
     table.append(element("tr", {}, element("td", {}, button), ...cells));
     return cells;
   });
-  const show = (sample) => rows.forEach((cells, k) => cells.forEach((cell, which) => {
-    cell.textContent = rounded(sample(series[k + which * panel.names.length].column), panel.digits);
+  // In the unit of the axis.
+  const show = (sample, exponent) => rows.forEach((cells, k) => cells.forEach((cell, which) => {
+    const number = sample(series[k + which * panel.names.length].column) / 10 ** exponent;
+    cell.textContent = rounded(number, Math.max(0, (panel.digits || 0) + exponent));
   }));
   return { table, show };
 }
 
-function addChart(section, panel) {
+// Range of a component and of its reference over all samples.
+function componentRange(panel, k) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const signal of [panel.signal, panel.reference].filter(Boolean)) {
+    for (const { columns, samples } of levels) {
+      const column = columns[HEAD.columns[signal] + k];
+      for (let at = 0; at < samples; at++) {
+        if (column[at] < low) low = column[at];
+        if (column[at] > high) high = column[at];
+      }
+    }
+  }
+  return [low, high];
+}
+
+// Gives components axes of their own where a common one would hide one of them. They keep them: charts that join again and again
+// cannot be read.
+function separateComponents() {
+  for (const shown of panels.filter(({ panel, isSeparate }) => !isSeparate && !panel.isCompared)) {
+    shown.isSeparate = needOwnAxes(shown.panel.names.map((_, k) => componentRange(shown.panel, k)));
+    if (shown.isSeparate) layOut(shown);
+  }
+  charts = panels.flatMap((shown) => shown.charts);
+}
+
+// Draws the charts of a panel: one, or one for each component.
+function layOut(shown) {
+  const { panel, box, isSeparate } = shown;
+  shown.charts.forEach(({ chart }) => chart.destroy());
+  box.replaceChildren();
+  const unit = panel.label.slice(panel.label.indexOf("["));
+  const components = panel.names.map((name, k) => ({
+    ...panel, label: `${name} ${unit}`, names: [name], first: k, color: k + (panel.color || 0), height: SMALL_PLOT_PX,
+  }));
+  const parts = isSeparate ? components : [{ ...panel, height: PLOT_HEIGHT_PX }];
+  shown.charts = parts.map((part, k) => addChart(box, part, k + 1 === parts.length));
+}
+
+function addChart(section, panel, isLowest) {
   const series = seriesOf(panel);
-  const plot = element("div", { className: "plot" });
+  const caption = element("div", { className: "caption" });
+  const plot = element("div", { className: "plot" }, caption);
   const box = element("div", { className: "chart" }, plot);
   section.append(box);
+  const made = { plot, series, axis: axisOf(panel.label, 0, 1, 0, 2) };
+  const timeAxis = (chart) => axisOf("time [s]", range.from, range.to, 0, Math.max(2, chart.bbox.width / uPlot.pxRatio / 70));
+  const valueAxis = (_, low, high) => {
+    made.axis = axisOf(panel.label, low ?? 0, high ?? 1, 0.05, VALUE_TICKS);
+    caption.textContent = made.axis.title;
+    return [made.axis.low, made.axis.high];
+  };
+  const xAxis = {
+    label: isLowest ? (chart) => timeAxis(chart).title : null,
+    splits: (chart) => timeAxis(chart).ticks, values: (chart) => timeAxis(chart).texts,
+  };
   const options = {
-    width: plot.clientWidth || 600, height: CHART_HEIGHT_PX, legend: { show: false }, axes: axes(panel.label),
-    scales: { x: { time: false, range: () => [range.from, range.to] }, y: { range: valueRange } },
+    width: plot.clientWidth || 600, height: panel.height + 8 + NUMBERS_PX + (isLowest ? LABEL_PX : 0), legend: { show: false },
+    axes: axes(xAxis, { splits: () => made.axis.ticks, values: () => made.axis.texts }),
+    scales: { x: { time: false, range: () => [range.from, range.to] }, y: { range: valueAxis } },
     series: [{}].concat(series.map((it) => ({ ...it, points: { show: false }, spanGaps: false }))),
     cursor: {
       y: false, points: { show: false }, drag: { x: true, y: false, setScale: false },
@@ -115,7 +153,7 @@ function addChart(section, panel) {
   };
   const legend = legendOf(panel, series, toggle);
   box.append(legend.table);
-  charts.push({ chart, plot, series, legend });
+  return Object.assign(made, { chart, legend });
 }
 
 function addFigures() {
@@ -123,8 +161,14 @@ function addFigures() {
   for (const figure of FIGURES) {
     const section = element("section", {}, element("h2", { textContent: figure.title }));
     figures.append(section);
-    figure.panels.forEach((panel) => addChart(section, panel));
+    for (const panel of figure.panels) {
+      const box = element("div");
+      section.append(box);
+      panels.push({ panel, box, charts: [], isSeparate: false });
+    }
   }
+  panels.forEach(layOut);
+  separateComponents();
 }
 
 function zoomTo(chart) {
@@ -145,8 +189,8 @@ function drawCharts() {
 function moveCursors(t) {
   const sample = sampleAt(t);
   const share = (t - range.from) / (range.to - range.from);
-  for (const { chart, legend } of charts) {
-    legend.show(sample);
+  for (const { chart, legend, axis } of charts) {
+    legend.show(sample, axis.exponent);
     // Not by the scale of the chart, which changes only when it is drawn.
     chart.setCursor({ left: (share * chart.bbox.width) / uPlot.pxRatio, top: 0 }, false);
   }
@@ -162,12 +206,12 @@ function resizeCharts() {
 let distributionChart = null;
 function drawDistributions(distributions) {
   const section = document.getElementById("distributions");
-  section.querySelectorAll(".chart, .table").forEach((old) => old.remove());
+  section.querySelectorAll(".chart, .wide").forEach((old) => old.remove());
   if (distributionChart) distributionChart.chart.destroy();
   distributionChart = null;
   const ends = [...new Set(distributions.flatMap((it) => it.bars.map(([at]) => at)))].sort((a, b) => a - b);
   if (ends.length > 0) distributionChart = distributionOf(section, distributions, ends);
-  section.append(percentiles(distributions));
+  section.append(element("div", { className: "wide" }, percentiles(distributions)));
 }
 
 // Least number on the axis: nothing is drawn below one cycle.
@@ -186,11 +230,14 @@ function distributionOf(section, distributions, ends) {
     swatch.style.color = `var(--c${k})`;
     legend.append(element("tr", {}, element("td", {}, swatch, ` ${it.name}`)));
   });
-  const [xAxis, yAxis] = axes("cycles");
-  const decade = (ticks) => ticks.map((tick) => (Number.isInteger(Math.round(1e6 * Math.log10(tick)) / 1e6) ? tickText(tick) : ""));
+  const decades = (text) => (_, ticks) => ticks.map((tick) => (Number.isInteger(Math.round(1e6 * Math.log10(tick)) / 1e6) ? text(tick) : ""));
+  const count = (tick) => (tick < 1e4 ? String(Math.round(tick)) : powerOfTen(Math.round(Math.log10(tick))));
   const options = {
     width: plot.clientWidth || 600, height: 230, legend: { show: false },
-    axes: [{ ...xAxis, label: "time [µs]", values: (_, ticks) => decade(ticks) }, { ...yAxis, values: (_, ticks) => decade(ticks) }],
+    axes: axes(
+      { label: "time", values: decades((tick) => quantityText(1e-6 * tick, "s")) },
+      { label: "cycles", size: Y_AXIS_PX - LABEL_PX, values: decades(count) },
+    ),
     scales: {
       x: { time: false, distr: 3, range: () => [ends[0] / 1.3, ends[ends.length - 1] * 1.3] },
       y: { distr: 3, range: (_, low, high) => [LEAST_COUNT, 1.5 * high] },

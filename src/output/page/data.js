@@ -107,12 +107,10 @@ function signalAt(sample, name, count) {
   return Array.from({ length: count }, (_, k) => sample(first + k));
 }
 
-// A number as people read it: four digits, and at least so many after the point.
+// A number as people read it: four digits, four at most after the point, and at least so many.
 function rounded(number, least = 0) {
   if (number === null || number !== number) return "–";
   const size = Math.abs(number);
-  if (size < 1e-9) return "0";
-  if (size < 1e-3 || size >= 1e6) return number.toExponential(2).replace("-", "−");
   const digits = size >= 1000 ? 0 : size >= 100 ? 1 : size >= 10 ? 2 : size >= 1 ? 3 : 4;
-  return number.toFixed(Math.max(digits, least)).replace("-", "−");
+  return fixed(number, Math.max(digits, least));
 }

@@ -2,7 +2,7 @@
 
 const LEGS = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
 const FIGURES = LEGS.map((name, k) => ({ title: `Force of ${name}, recorded and predicted`, panels: [
-  { label: "force [N]", names: ["recorded", "file", "identified"], signal: `leg_${k + 1}`, dashed: 2 },
+  { label: "force [N]", names: ["recorded", "file", "identified"], signal: `leg_${k + 1}`, dashed: 2, isCompared: true },
 ] })).concat([
   { title: "Residuals with the file: recorded less predicted force", panels: [{ label: "residual [N]", names: LEGS, signal: "residual_before" }] },
   { title: "Residuals with the identified values, on a scale of their own", panels: [{ label: "residual [N]", names: LEGS, signal: "residual_after" }] },
@@ -49,7 +49,7 @@ function begin() {
     return;
   }
   byId("motion").textContent = HEAD.motion;
-  byId("step").textContent = `${rounded(1000 * HEAD.levels[0].step)} ms`;
+  byId("step").textContent = quantityText(HEAD.levels[0].step, "s");
   byId("residuals").append(row("th", ["leg", "file RMS [N]", "largest", "identified RMS [N]", "largest", "correlation"]));
   byId("residuals").append(...HEAD.residuals.map((cells) => row("td", cells)));
   addFigures();

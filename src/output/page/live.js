@@ -75,11 +75,12 @@ async function follow() {
         setTime(HEAD.length_s);
       }
       if (redrawn++ % 10 === 0) {
+        separateComponents();
         drawDistributions(fresh.distributions);
         fillList();
       }
       document.body.dataset.result = JSON.stringify({
-        samples: levels[0].samples, charts: charts.length, state: intervalText(HEAD.length_s).split(" · ")[0],
+        samples: levels[0].samples, charts: panels.length, state: intervalText(HEAD.length_s).split(" · ")[0],
         error: document.body.dataset.error || null,
       });
     } catch (failure) {

@@ -18,6 +18,7 @@ const STYLES: [&str; 2] = [include_str!("uplot/uPlot.min.css"), include_str!("pa
 /// Scripts of all pages in the order in which they run.
 const LIBRARY: &str = include_str!("uplot/uPlot.iife.min.js");
 const DATA: &str = include_str!("data.js");
+const AXIS: &str = include_str!("axis.js");
 const CHARTS: &str = include_str!("charts.js");
 const PAGE: &str = include_str!("page.js");
 
@@ -49,6 +50,7 @@ impl PageKind {
             Self::Recording | Self::Live => &[
                 LIBRARY,
                 DATA,
+                AXIS,
                 include_str!("figures.js"),
                 CHARTS,
                 include_str!("tracks.js"),
@@ -57,7 +59,7 @@ impl PageKind {
                 PAGE,
                 include_str!("run.js"),
             ],
-            Self::Identification => &[LIBRARY, DATA, CHARTS, PAGE, include_str!("identification.js")],
+            Self::Identification => &[LIBRARY, DATA, AXIS, CHARTS, PAGE, include_str!("identification.js")],
         }
     }
 }

@@ -49,7 +49,7 @@ function findLargestForce() {
       if (Math.abs(column[k]) > largestForce) largestForce = Math.abs(column[k]);
     }
   }
-  const text = largestForce > 0 ? `${rounded(largestForce)} N` : "no force";
+  const text = largestForce > 0 ? quantityText(largestForce, "N") : "no force";
   document.getElementById("scale").textContent = text;
 }
 
@@ -182,9 +182,9 @@ function drawForces(pen, project, platform, forces) {
 
 function describe(angles, position, isKnown) {
   const line = (names, numbers, unitName, digits) =>
-    names.map((name, k) => `${name} ${numbers[k].toFixed(digits).replace("-", "−")} ${unitName}`).join("   ");
+    names.map((name, k) => `${name} ${fixed(numbers[k], digits)} ${unitName}`).join(", ");
   document.getElementById("pose").textContent = isKnown
-    ? `${line(AXES, position, "m", HEAD.machine.m_digits)}\n${line(["alpha", "beta", "gamma"], angles, "°", HEAD.machine.deg_digits)}\n${intervalText(now)}`
+    ? `${line(AXES, position.map((number) => 1000 * number), "mm", HEAD.machine.m_digits - 3)}\n${line(["alpha", "beta", "gamma"], angles, "°", HEAD.machine.deg_digits)}\n${intervalText(now)}`
     : `pose unknown; drawn at home\n\n${intervalText(now)}`;
 }
 

@@ -1,6 +1,8 @@
 // Tracks: intervals along the time axis, below each other, aligned with the charts.
 
 const ROW_PX = 20;
+// Height of a name above its row where it has no room beside it.
+const NAME_PX = 16;
 const HEAD_PX = 4;
 const SCALE_PX = 20;
 const LEGEND_PX = 224;
@@ -20,15 +22,19 @@ function intervalColor(track, interval) {
   return track.group === "requests" ? color("accent") : color("stopping");
 }
 
+// As the legends of the charts, which are below them on a narrow screen.
+const isNarrow = () => matchMedia("screen and (max-width: 700px)").matches;
+
 function plotWidth(canvas) {
-  return Math.max(100, canvas.clientWidth - Y_AXIS_PX - LEGEND_PX - RIGHT_PX);
+  return Math.max(100, canvas.clientWidth - Y_AXIS_PX - (isNarrow() ? 0 : LEGEND_PX) - RIGHT_PX);
 }
 
 const trackX = (t, width) => Y_AXIS_PX + ((t - range.from) / (range.to - range.from)) * width;
 
 function drawTracks() {
   const canvas = document.getElementById("tracks");
-  const height = HEAD_PX + tracks.length * ROW_PX + SCALE_PX;
+  const row = ROW_PX + (isNarrow() ? NAME_PX : 0);
+  const height = HEAD_PX + tracks.length * row + SCALE_PX;
   canvas.style.height = `${height}px`;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = Math.round(canvas.clientWidth * ratio);
@@ -38,8 +44,8 @@ function drawTracks() {
   pen.font = "12px system-ui, sans-serif";
   pen.textBaseline = "middle";
   const width = plotWidth(canvas);
-  tracks.forEach((track, row) => drawTrack(pen, track, HEAD_PX + row * ROW_PX, width));
-  drawScale(pen, HEAD_PX + tracks.length * ROW_PX, width);
+  tracks.forEach((track, k) => drawTrack(pen, track, HEAD_PX + (k + 1) * row - ROW_PX, width));
+  drawScale(pen, height - SCALE_PX, width);
   drawNow(pen, height - SCALE_PX, width);
 }
 
@@ -68,24 +74,22 @@ function drawTrack(pen, track, top, width) {
   pen.textAlign = "left";
   const name = track.group === "limits reached" ? `limit: ${track.name}` : track.name;
   const count = track.group === "missed deadlines" ? `  ${track.count}` : "";
-  pen.fillText(name + count, Y_AXIS_PX + width + RIGHT_PX + 8, top + ROW_PX / 2);
+  const [x, y] = isNarrow() ? [Y_AXIS_PX, top - NAME_PX / 2] : [Y_AXIS_PX + width + RIGHT_PX + 8, top + ROW_PX / 2];
+  pen.fillText(name + count, x, y);
 }
 
 function drawScale(pen, top, width) {
-  const span = range.to - range.from;
-  const raw = span / Math.max(2, width / 110);
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((k) => k * power).find((it) => it >= raw);
+  const { ticks, texts, title } = axisOf("time [s]", range.from, range.to, 0, Math.max(2, width / 70));
   pen.textAlign = "center";
-  for (let k = Math.ceil(range.from / step); k * step <= range.to; k++) {
-    const x = trackX(k * step, width);
+  ticks.forEach((tick, k) => {
+    const x = trackX(tick, width);
     pen.fillStyle = color("edge");
     pen.fillRect(x, top, 1, 4);
     pen.fillStyle = color("ink");
-    pen.fillText(tickText(k * step), x, top + 12);
-  }
+    pen.fillText(texts[k], x, top + 12);
+  });
   pen.textAlign = "left";
-  pen.fillText("time [s]", Y_AXIS_PX + width + RIGHT_PX + 8, top + 12);
+  if (!isNarrow()) pen.fillText(title, Y_AXIS_PX + width + RIGHT_PX + 8, top + 12);
 }
 
 function drawNow(pen, height, width) {

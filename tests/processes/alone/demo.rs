@@ -113,7 +113,8 @@ fn demonstrate(machine: &str, patient: bool) -> Demonstration {
     let start = Instant::now();
     let mut command = hexad();
     command.arg("demo").arg("--config").arg(config).args(["--seconds", &SECONDS.to_string()]);
-    command.arg("--report").arg(files.path("report.json")).arg("--charts").arg(files.path("charts"));
+    command.arg("--report").arg(files.path("report.json"));
+    command.arg("--pictures").arg("--charts").arg(files.path("charts"));
     command.env("TMPDIR", files.folder());
     let demo = Hexad::spawn(&files, "demo", command);
     let id = demo.id();

@@ -40,6 +40,9 @@ fn nobody_is_served_beside_root() {
     assert_eq!(status.code(), Some(0), "{stdout}\n{stderr}");
     assert!(Path::new("/tmp/hexad-65534/prefix").exists(), "it has shared memory of its own");
     assert!(stdout.contains("faults           0"), "{stdout}");
+    let page = machine.path("charts").join("report.html");
+    assert!(stdout.ends_with(&format!("report           {}\n", page.display())), "{stdout}");
+    assert!(!machine.path("charts").join("forces.svg").exists(), "pictures are written on request alone");
     plant.stops_on("TERM", HANG);
 }
 

@@ -39,12 +39,22 @@ impl Browser {
     /// Opens a file with a script at its end, which sets `document.body.dataset.result` to JSON. The console must stay
     /// empty: errors and what the policy of the page refuses would be there.
     pub fn run(&self, page: &Path, script: &str) -> Value {
-        let text = fs::read_to_string(page).unwrap();
-        let with_script = self.profile.path().join("page.html");
-        let end = text.rfind("</body>").unwrap();
-        let (before, after) = text.split_at(end);
-        fs::write(&with_script, format!("{before}<script>{script}</script>{after}")).unwrap();
-        self.open(&format!("file://{}", with_script.display()), "--virtual-time-budget=20000")
+        self.show(&with_script(page, script))
+    }
+
+    /// The same in frames of these widths \[pixels\]; returns an array of what each has left.
+    pub fn run_in_widths(&self, page: &Path, script: &str, widths: &[u32]) -> Value {
+        let text = serde_json::to_string(&with_script(page, script)).unwrap().replace('<', "\\u003c");
+        let frames = include_str!("frames.js");
+        self.show(&format!(
+            "<body><script>const PAGE = {text}, WIDTHS = {widths:?};\n{frames}</script></body>"
+        ))
+    }
+
+    fn show(&self, text: &str) -> Value {
+        let path = self.profile.path().join("page.html");
+        fs::write(&path, text).unwrap();
+        self.open(&format!("file://{}", path.display()), "--virtual-time-budget=20000")
     }
 
     /// Opens an address; `end` is the option that says when the page is looked at.
@@ -68,4 +78,11 @@ impl Browser {
     pub fn path(&self, name: &str) -> PathBuf {
         self.profile.path().join(name)
     }
+}
+
+/// Text of a page with a script at its end.
+fn with_script(page: &Path, script: &str) -> String {
+    let text = fs::read_to_string(page).unwrap();
+    let (before, after) = text.split_at(text.rfind("</body>").unwrap());
+    format!("{before}<script>{script}</script>{after}")
 }

@@ -22,6 +22,7 @@ use hexad::recording::file::RecordingFile;
 use serde_json::Value;
 
 use super::browser::Browser;
+use super::widths::fits_every_width;
 use crate::common::identified::{Series, drawn};
 use crate::support::children::run;
 use crate::support::machine::Machine;
@@ -119,6 +120,7 @@ fn the_page_of_an_identification_shows_the_numbers_of_the_text() {
     let (text, json, shown) = identified(&machine, &recording, &page);
     assert!(fs::metadata(&page).unwrap().len() < 400_000);
     let Some(shown) = shown else { return };
+    fits_every_width(&page, "[]");
     assert_eq!([&shown["error"], &shown["drawn"]], [&Value::Null, &Value::from(vec![true; 8])]);
     check_residuals(&json, &text, &shown);
     let legs = json["legs"].as_array().unwrap();

@@ -4,3 +4,4 @@ mod browser;
 mod identification;
 mod report;
 mod view;
+mod widths;

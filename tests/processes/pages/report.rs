@@ -23,12 +23,12 @@ use crate::support::children::{Ended, run};
 use crate::support::machine::Machine;
 
 /// Slow cycles, so that an hour is a small file.
-const RATE_HZ: u64 = 20;
+pub(super) const RATE_HZ: u64 = 20;
 const PERIOD_NS: u64 = 1_000_000_000 / RATE_HZ;
 const CYCLES: u64 = 3600 * RATE_HZ;
 
 /// First cycle of a fault, and how many it lasts.
-const FAULT: u64 = CYCLES / 3;
+pub(super) const FAULT: u64 = CYCLES / 3;
 const FAULT_CYCLES: u64 = 100;
 
 /// Cycle with a single extreme force, far from every event \[N\].
@@ -42,13 +42,13 @@ const MISSING: std::ops::Range<u64> = CYCLES - 500..CYCLES - 490;
 const SCRIPT: &str = concat!(include_str!("is_drawn.js"), include_str!("drive.js"));
 
 /// A configuration with slow cycles.
-fn config(machine: &Machine) -> Config {
+pub(super) fn config(machine: &Machine) -> Config {
     let text = fs::read_to_string(&machine.file).unwrap();
     Config::parse(&format!("{text}\n[realtime]\nrate_hz = {RATE_HZ}\n"), "the test").unwrap()
 }
 
 /// A cycle of a platform that moves slowly.
-fn cycle(config: &Config, number: u64) -> CycleMessage {
+pub(super) fn cycle(config: &Config, number: u64) -> CycleMessage {
     let t = (number - 1) as f64 / RATE_HZ as f64;
     let mut x = config.machine.home;
     x[2] += 0.1 * (0.01 * t).sin();
@@ -119,7 +119,7 @@ fn write_of_run(
 }
 
 /// `hexad report` of some files must succeed; returns what it prints.
-fn report(machine: &Machine, recordings: &[PathBuf], page: &Path) -> String {
+pub(super) fn report(machine: &Machine, recordings: &[PathBuf], page: &Path) -> String {
     let mut arguments = vec!["report".to_string(), "-o".into(), page.display().to_string()];
     arguments.extend(recordings.iter().map(|path| path.display().to_string()));
     let Ended { status, stdout, stderr } =

@@ -10,10 +10,12 @@ use serde_json::Value;
 
 use super::browser::Browser;
 use crate::support::children::{HANG, Hexad};
-use crate::support::machine::Machine;
+use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::engage;
 use crate::support::trio::{Trio, start_daemon, start_setpoints};
 use crate::support::turns;
+
+const TIP: &str = "\n[[frame]]\nname = 'tip'\nkind = 'tool'\npose = [0.0, 0.0, 0.0, 0.3, 0.0, 0.0]\n";
 
 /// A running `hexad view`, with its port and its token.
 struct View {
@@ -23,8 +25,8 @@ struct View {
 }
 
 impl View {
-    fn start(machine: &Machine) -> Self {
-        let process = Hexad::start::<&str>(machine, "view", &[]);
+    fn start(machine: &Machine, more: &[&str]) -> Self {
+        let process = Hexad::start(machine, "view", more);
         let start = Instant::now();
         loop {
             assert!(start.elapsed() < HANG, "no address: {}", process.words());
@@ -82,8 +84,8 @@ fn states(data: &Value) -> Vec<&str> {
 #[test]
 fn without_its_token_nothing_is_shown_and_with_it_nothing_can_be_changed() {
     let _turn = turns::beside_others();
-    let machine = Machine::patient("view-token");
-    let mut view = View::start(&machine);
+    let machine = Machine::with("view-token", &format!("{PATIENT}{TIP}"));
+    let mut view = View::start(&machine, &[]);
     let token = view.token.clone();
     assert!(token.len() == 32 && token.bytes().all(|digit| digit.is_ascii_hexdigit()), "{token}");
     let wrong = "0".repeat(32);
@@ -104,7 +106,11 @@ fn without_its_token_nothing_is_shown_and_with_it_nothing_can_be_changed() {
     // It is in no list of processes, and each start has another one.
     let line = fs::read_to_string(format!("/proc/{}/cmdline", view.process.id())).unwrap();
     assert!(!line.contains(&token));
-    assert_ne!(View::start(&machine).token, token);
+    let of_tool = View::start(&machine, &["--tool", "tip"]);
+    assert_ne!(of_tool.token, token);
+    let words = "\"coordinates\":\"coordinates of tip in the base frame\"";
+    let page_of_tool = of_tool.send(&format!("GET /?token={} HTTP/1.1", of_tool.token));
+    assert_eq!([&page, &page_of_tool].map(|page| page.contains(words)), [false, true]);
     // A browser that says nothing does not hold it up, and it stops in order.
     let _silent: Vec<_> =
         (0..8).map(|_| TcpStream::connect(format!("127.0.0.1:{}", view.port)).unwrap()).collect();
@@ -117,7 +123,7 @@ fn without_its_token_nothing_is_shown_and_with_it_nothing_can_be_changed() {
 fn a_running_machine_is_shown_also_after_the_daemon_has_started_again() {
     let _turn = turns::beside_others();
     let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("view-live");
-    let view = View::start(&machine);
+    let view = View::start(&machine, &[]);
     let data = view.until("an active platform", |data| {
         states(data) == ["active"]
             && data["first"].as_u64() == Some(0)
