@@ -67,6 +67,11 @@ impl StatusSource {
         Self { loaded, reloads: 0, topics: None }
     }
 
+    /// The configuration in force.
+    pub fn loaded(&self) -> &Arc<Loaded> {
+        &self.loaded
+    }
+
     /// Replaces the configuration after a reload.
     pub fn set_loaded(&mut self, loaded: Arc<Loaded>) {
         (self.loaded, self.reloads) = (loaded, self.reloads + 1);
@@ -94,7 +99,7 @@ impl StatusSource {
         let status = &snapshot.status;
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
         let setpoint = snapshot.setpoint.filter(|setpoint| setpoint.task.is_finite());
-        let follows = matches!(status.state(), Some(State::Engaging | State::Active));
+        let follows = status.state().is_some_and(State::follows);
         let limits = Limit::ALL.into_iter().filter(|it| LimitSet(status.active_limits).contains(*it));
         StatusReport {
             version: BUILD.into(),
