@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::arguments::MachineFile;
-use super::frame_options::FrameOptions;
 use super::failure::{CommandError, Failure};
+use super::frame_options::FrameOptions;
 use super::machine_file::{difference, with_frame, write_new};
 use crate::config::Config;
 use crate::config::frames::{FrameKind, NamedFrame};

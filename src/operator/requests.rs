@@ -98,7 +98,9 @@ pub fn ask_first(
     machine: &str,
     mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
 ) -> Result<AnswerLine, OperatorError> {
-    first_answer(machine, |endpoint| ask_at(endpoint, Endpoint::connect, |mut connection| ask(&mut connection)))
+    first_answer(machine, |endpoint| {
+        ask_at(endpoint, Endpoint::connect, |mut connection| ask(&mut connection))
+    })
 }
 
 fn first_answer<T>(

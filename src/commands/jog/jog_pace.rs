@@ -44,8 +44,8 @@ impl JogPace {
     /// Continuous motion of a machine.
     pub fn new(config: &Config) -> Self {
         let limits = config.deployment.limits.in_force();
-        let largest =
-            [&limits.position, &limits.orientation].map(|limits_of| limits.autonomous_scale * limits_of.velocity);
+        let largest = [&limits.position, &limits.orientation]
+            .map(|limits_of| limits.autonomous_scale * limits_of.velocity);
         let digits = MotionDigits::new(config.resolution());
         Self { digits, largest, is_continuous: true, share: FIRST_SHARE, step: FIRST_STEP }
     }

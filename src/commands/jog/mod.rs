@@ -89,7 +89,9 @@ fn jog(
             match (key, pace.pace()) {
                 (Key::Leave, _) => break,
                 (Key::Mode, _) => is_jogging = false,
-                (Key::Move { .. }, Pace::Continuous(_)) => (held, is_jogging) = (Some((key, Instant::now())), true),
+                (Key::Move { .. }, Pace::Continuous(_)) => {
+                    (held, is_jogging) = (Some((key, Instant::now())), true)
+                }
                 (Key::Move { axis, sign }, step) => {
                     let target = step.along(axis, sign).map(|step| Some(step).filter(|step| *step != 0.0));
                     let target = Some(TargetFields::new(target));

@@ -66,8 +66,8 @@ impl fmt::Display for JogScreen<'_> {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::commands::status::screen::tests::answer;
     use crate::commands::jog::jog_pace::JogPace;
+    use crate::commands::status::screen::tests::answer;
     use crate::config::Config;
 
     #[test]
@@ -75,8 +75,8 @@ mod tests {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
         let (pace, coordinates) = (JogPace::new(&config).pace(), Coordinates::default());
         let held = Some(Key::Move { axis: 5, sign: -1.0 });
-        let text =
-            JogScreen { answer: &answer(), pace, bound: "leg 1", coordinates: &coordinates, held }.to_string();
+        let text = JogScreen { answer: &answer(), pace, bound: "leg 1", coordinates: &coordinates, held }
+            .to_string();
         let widest = text.lines().map(|line| line.chars().count()).max();
         assert!(text.lines().count() <= 24 && widest <= Some(80), "{text}");
         for words in ["STOPPING", "force, force rate, stroke", "moving    z down", "setpoint", "1225.000"] {

@@ -9,8 +9,8 @@ use clap::Args;
 
 use self::screen::Screen;
 use super::arguments::OptionalMachineFile;
-use super::frame_options::FrameOptions;
 use super::failure::Failure;
+use super::frame_options::FrameOptions;
 use super::request::machine_name;
 use crate::config::Config;
 use crate::config::coordinates::Coordinates;

@@ -11,7 +11,7 @@ use super::connection::Connection;
 use super::order::{Order, PendingOrder, Step};
 use super::{MAX_WITHIN_S, Server};
 use crate::control::signals::state::Request;
-use crate::daemon::motion_requests::job::{End, Jog, Job, MotionEvent, MotionInput};
+use crate::daemon::motion_requests::job::{End, Job, Jog, MotionEvent, MotionInput};
 use crate::daemon::motion_requests::order::{Motion, MotionOrder};
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::clock::monotonic_ns;

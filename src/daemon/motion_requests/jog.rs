@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::job::{Jog, Job, JobFeed, MotionEvent};
+use super::job::{Job, JobFeed, Jog, MotionEvent};
 use super::jog_target::JogTarget;
 use crate::control::constants::Constants;
 use crate::daemon::target_source::{TargetError, is_reached};
@@ -34,8 +34,7 @@ pub fn run(
         let end = job.end();
         newest = job.newest_jog().unwrap_or(newest);
         let step_s = core::mem::replace(&mut moved, Instant::now()).elapsed().as_secs_f64().min(MAX_STEP_S);
-        let is_moving =
-            end.is_none() && monotonic_ns().saturating_sub(newest.time_ns) < REQUEST_TIMEOUT_NS;
+        let is_moving = end.is_none() && monotonic_ns().saturating_sub(newest.time_ns) < REQUEST_TIMEOUT_NS;
         if source.active_since_ns().is_none() {
             if !is_moving {
                 return Ok(());

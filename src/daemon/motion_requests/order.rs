@@ -88,11 +88,8 @@ fn refuse_fields_of_others(line: &RequestLine) -> Result<(), String> {
         ("speed", line.speed.is_some()),
         ("tolerance_m", line.tolerance_m.is_some()),
     ];
-    let of_coordinates = [
-        ("tool", line.tool.is_some()),
-        ("work", line.work.is_some()),
-        ("rotation", line.rotation.is_some()),
-    ];
+    let of_coordinates =
+        [("tool", line.tool.is_some()), ("work", line.work.is_some()), ("rotation", line.rotation.is_some())];
     let request = line.request.as_str();
     let foreign = of_goto.into_iter().filter(|_| request != GOTO);
     let foreign = foreign.chain(of_coordinates.into_iter().filter(|_| request == HOLD));
@@ -163,7 +160,12 @@ fn coordinates(line: &RequestLine, config: &Config) -> Result<Coordinates, Strin
     Ok(Coordinates::new(config, is_given.then_some(Frames { work, tool }), names, order))
 }
 
-fn frame(field: &Option<FrameField>, kind: FrameKind, config: &Config, default: Pose) -> Result<Pose, String> {
+fn frame(
+    field: &Option<FrameField>,
+    kind: FrameKind,
+    config: &Config,
+    default: Pose,
+) -> Result<Pose, String> {
     match field {
         None => Ok(default),
         Some(FrameField::Pose(x)) => {

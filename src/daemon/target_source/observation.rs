@@ -70,19 +70,13 @@ impl Observation {
     }
 
     /// Adds the measured pose and the reference, which is the pose plus its error.
-    fn with_pose(
-        self,
-        pose: Option<[f64; 6]>,
-        error: Option<([f64; 3], [f64; 3])>,
-        home: &[f64; 6],
-    ) -> Self {
+    fn with_pose(self, pose: Option<[f64; 6]>, error: Option<([f64; 3], [f64; 3])>, home: &[f64; 6]) -> Self {
         let error = error.filter(|_| self.state.has_control()).map(|(angular, linear)| Twist {
             angular: Vector3::from(angular),
             linear: Vector3::from(linear),
         });
-        let displaced = |(pose, error): ([f64; 6], Twist)| {
-            task_coordinates(&pose_of(&pose).displaced(&error), home)
-        };
+        let displaced =
+            |(pose, error): ([f64; 6], Twist)| task_coordinates(&pose_of(&pose).displaced(&error), home);
         Self { reference: pose.zip(error).map(displaced).or(pose), pose, ..self }
     }
 }

@@ -8,7 +8,11 @@ use super::{Shortfall, refusals};
 
 /// Puts the calling thread under SCHED_FIFO at this priority.
 pub fn fifo_priority(priority: i32) -> Result<(), Shortfall> {
-    if set_policy(libc::SCHED_FIFO, priority) { Ok(()) } else { Err(refusals::of(&SetupStep::Fifo(priority))) }
+    if set_policy(libc::SCHED_FIFO, priority) {
+        Ok(())
+    } else {
+        Err(refusals::of(&SetupStep::Fifo(priority)))
+    }
 }
 
 /// Puts the calling thread back under the ordinary policy, which is always permitted.

@@ -140,7 +140,8 @@ pub fn follow(
         match phase {
             Phase::Boarding | Phase::Leaving => {
                 source.publish(boarding)?;
-                let is_there = source.active_since_ns().is_some() && is_reached(&source.present_x()?, &boarding);
+                let is_there =
+                    source.active_since_ns().is_some() && is_reached(&source.present_x()?, &boarding);
                 match phase {
                     Phase::Leaving if is_there => break,
                     Phase::Boarding if is_there && receiver.is_alive(now_ns) => {
