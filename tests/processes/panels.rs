@@ -41,7 +41,11 @@ struct Panels {
 
 impl Panels {
     fn start(test: &str) -> Self {
-        let machine = Machine::with(test, &format!("{PATIENT}{FRAME}"));
+        Self::with(test, "")
+    }
+
+    fn with(test: &str, sections: &str) -> Self {
+        let machine = Machine::with(test, &format!("{PATIENT}{FRAME}{sections}"));
         let recorder = Recorder::start(&machine.name);
         let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
         daemon.says("standby: no setpoint");
@@ -118,11 +122,10 @@ impl Panel {
 }
 
 #[test]
-fn a_target_is_reached_and_a_bad_one_is_refused_with_its_field() {
+fn a_bad_request_is_refused_with_its_field() {
     let _turn = turns::beside_others();
     let panels = Panels::start("panels");
     let mut panel = panels.client();
-    let began_ns = monotonic_ns();
     for (request, more, words) in [
         ("goto", json!({}), "target: is missing"),
         (
@@ -148,17 +151,23 @@ fn a_target_is_reached_and_a_bad_one_is_refused_with_its_field() {
     }
     panel.0.send("{\"version\": 1, \"request\": \"goto\", \"target\": {\"x_m\": NaN}}\n");
     assert_eq!(panel.answer().0, "invalid");
-    let there = json!({"target": {"x_m": 0.02, "gamma_rad": 0.05}, "relative": true, "wait": true});
-    for request in ["goto", "hold", "jog"] {
-        let more = match request {
-            "goto" => there.clone(),
-            "jog" => json!({"rate": {"x_m_s": 0.01}}),
-            _ => json!({}),
-        };
+    for (request, more) in
+        [("goto", json!({"home": true})), ("hold", json!({})), ("jog", json!({"rate": {"x_m_s": 0.01}}))]
+    {
         let text = panel.does(request, &more, "refused");
         assert!(text.contains("not under control (state standby"), "{text}");
     }
     assert!(panels.recorder.so_far().setpoints.is_empty(), "nothing was published");
+    panels.finish();
+}
+
+#[test]
+fn a_target_is_reached_in_the_coordinates_of_the_request() {
+    let _turn = turns::beside_others();
+    let panels = Panels::start("panel-target");
+    let mut panel = panels.client();
+    let began_ns = monotonic_ns();
+    let there = json!({"target": {"x_m": 0.02, "gamma_rad": 0.05}, "relative": true, "wait": true});
     assert_eq!(
         panel.does("hold", &json!({"engage": true, "wait": true}), "done"),
         "the platform stands under control"
@@ -265,6 +274,27 @@ fn a_later_motion_takes_over_and_a_stop_ends_it() {
     other.does("stop", &json!({"wait": true}), "done");
     let ended = panel.answer();
     assert!(["failed", "superseded"].contains(&ended.0.as_str()), "{ended:?}");
+    let_pass(Duration::from_millis(500));
+    assert_eq!(status(&panels.machine)["state"], "standby");
+    panels.finish();
+}
+
+#[test]
+fn a_stop_ends_the_wait_for_control() {
+    let _turn = turns::beside_others();
+    let panels = Panels::with("panel-stop", "[limits]\nautonomous_scale = 0.02\n");
+    let (mut panel, mut other) = (panels.client(), panels.client());
+    panel.does("hold", &json!({"engage": true, "wait": true}), "done");
+    let away = json!({"target": {"z_m": 0.03}, "wait": true});
+    panel.does("goto", &away, "done");
+    // It takes seconds, and until then no motion takes control.
+    other.does("park", &json!({}), "accepted");
+    let back = json!({"target": {"z_m": 0.03}, "wait": true, "engage": true, "progress": true});
+    panel.send("goto", &back);
+    assert_eq!(panel.answer().0, "accepted");
+    assert_eq!(panel.answer(), ("waiting".into(), "not possible in state parking".into()));
+    other.does("stop", &json!({"wait": true}), "done");
+    assert_eq!(panel.answer().0, "superseded");
     let_pass(Duration::from_millis(500));
     assert_eq!(status(&panels.machine)["state"], "standby");
     panels.finish();

@@ -115,7 +115,7 @@ impl Server<'_> {
                 (&order.motion, is_own && running.is_jog, &self.motions.next)
             {
                 let jog = Jog { rates: *rates, coordinates: order.coordinates.clone(), time_ns };
-                if running.inputs.send(MotionInput::Jog(jog)).is_ok() {
+                if running.inputs.send(MotionInput::Jog(Box::new(jog))).is_ok() {
                     debug!(user = %peer.user(), process = peer.process_id, "jog");
                     return connection.send(&named(RequestResult::Accepted, running.blocked.clone()));
                 }

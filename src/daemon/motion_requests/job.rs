@@ -44,7 +44,7 @@ pub enum End {
 #[derive(Debug)]
 pub enum MotionInput {
     /// Another request of the jog.
-    Jog(Jog),
+    Jog(Box<Jog>),
     /// The motion is to end.
     End(End),
 }
@@ -95,7 +95,7 @@ impl Job {
     pub fn end(&self) -> Option<End> {
         loop {
             match self.inputs.try_recv() {
-                Ok(MotionInput::Jog(jog)) => drop(self.jog.replace(Some(jog))),
+                Ok(MotionInput::Jog(jog)) => drop(self.jog.replace(Some(*jog))),
                 Ok(MotionInput::End(end)) => self.end.set(Some(end)),
                 Err(TryRecvError::Disconnected) => self.end.set(Some(End::AtOnce)),
                 Err(TryRecvError::Empty) => return self.end.get(),

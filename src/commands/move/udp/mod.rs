@@ -9,6 +9,7 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::time::Duration;
 
 use clap::Args;
 use tracing::{info, warn};
@@ -25,6 +26,7 @@ use crate::config::Config;
 use crate::control::parameters::ViolationPolicy;
 use crate::daemon::constants;
 use crate::daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
+use crate::messages::Bus;
 use crate::messages::clock::monotonic_ns;
 use crate::model::task::pose_of;
 use crate::motion::minimum_jerk::{rise, straight_move};
@@ -120,14 +122,8 @@ pub fn follow(
     let boarding = options.boarding.unwrap_or(config.machine.home);
     let constants = constants(config);
     check_target(&constants, &pose_of(&boarding)).map_err(TargetError::from)?;
-    let (answer, within) = (status(&config.name).map_err(TargetError::from)?, playback.engage_within());
-    if let Some(other) = answer.status.as_deref().and_then(other_source) {
-        return Err(TargetError::OtherSource(other).into());
-    }
     let bus = config.join().map_err(TargetError::from)?;
-    let feed = StatusFeed::start(config, &answer, within, stop);
-    let mut source = TargetSource::open(config, &bus, feed, within.is_some())?;
-    prepare_thread(config);
+    let mut source = open_source(config, &bus, playback.engage_within(), stop)?;
     info!(%address, "moves to the boarding pose, then waits for datagrams");
     let mut phase = Phase::Boarding;
     while !stop.is_repeated() {
@@ -176,6 +172,23 @@ pub fn follow(
     }
     receiver.log_totals();
     if stop.is_repeated() { Err(StreamError::Interrupted) } else { Ok(()) }
+}
+
+/// The source, if no other one runs. From now on this thread must be punctual.
+fn open_source<'a>(
+    config: &'a Config,
+    bus: &Bus,
+    within: Option<Duration>,
+    stop: &Stop,
+) -> Result<TargetSource<'a, StatusFeed>, TargetError> {
+    let answer = status(&config.name)?;
+    if let Some(other) = answer.status.as_deref().and_then(other_source) {
+        return Err(TargetError::OtherSource(other));
+    }
+    let feed = StatusFeed::start(config, &answer, within, stop);
+    let source = TargetSource::open(config, bus, feed, within.is_some())?;
+    prepare_thread(config);
+    Ok(source)
 }
 
 /// What the platform does.
