@@ -204,6 +204,13 @@ fn a_jog_ends_without_messages_and_with_its_connection() {
     let panels = Panels::start("panel-jog");
     let (mut panel, mut other) = (panels.client(), panels.client());
     panel.does("hold", &json!({"engage": true, "wait": true}), "done");
+    // The motion belongs to its connection.
+    for (request, more) in
+        [("goto", json!({"home": true})), ("hold", json!({})), ("jog", json!({"rate": {}}))]
+    {
+        let text = other.does(request, &more, "refused");
+        assert!(text.contains(&format!("a hold of process {} is in progress", std::process::id())), "{text}");
+    }
     let up = json!({"rate": {"z_m_s": 0.04}});
     let jog = |panel: &mut Panel| {
         let began_m = panels.x()[5];
@@ -215,9 +222,6 @@ fn a_jog_ends_without_messages_and_with_its_connection() {
         }
     };
     jog(&mut panel);
-    // The motion belongs to its connection.
-    let text = other.does("goto", &json!({"home": true}), "refused");
-    assert!(text.contains(&format!("a jog of process {} is in progress", std::process::id())), "{text}");
     panels.until_it_stands();
     let stands = panels.x();
     let_pass(Duration::from_millis(500));
@@ -228,7 +232,7 @@ fn a_jog_ends_without_messages_and_with_its_connection() {
     panels.until_it_stands();
     assert!(panels.x()[5] > stands[5] + 0.005, "{:?}", panels.x());
     // A target that a connection waits for ends with the connection; one that it does not wait for remains.
-    let slowly = json!({"target": {"z_m": 0.0}, "speed": 0.1, "wait": true, "progress": true});
+    let slowly = json!({"target": {"z_m": 0.0}, "speed": 0.05, "wait": true, "progress": true});
     other.send("goto", &slowly);
     assert_eq!(other.answer().0, "accepted");
     panels.until_in_motion();
@@ -252,15 +256,15 @@ fn a_later_motion_takes_over_and_a_stop_ends_it() {
     let panels = Panels::start("panel-later");
     let mut panel = panels.client();
     panel.does("goto", &json!({"home": true, "engage": true, "wait": true}), "done");
-    let step = json!({"target": {"z_m": 0.03}, "relative": true, "wait": true, "speed": 0.5});
-    panel.send("goto", &step);
+    let step = |speed: f64| json!({"target": {"z_m": 0.03}, "relative": true, "wait": true, "speed": speed});
+    panel.send("goto", &step(0.1));
     panels.until_in_motion();
-    panel.send("goto", &step);
+    panel.send("goto", &step(1.0));
     let (first, second) = (panel.answer(), panel.answer());
     assert_eq!((first.0.as_str(), second.0.as_str()), ("superseded", "done"), "{first:?} {second:?}");
     // Steps add up, wherever the platform is when they arrive.
     assert!((panels.x()[5] - 0.06).abs() < 1e-4, "{:?}", panels.x());
-    panel.send("goto", &json!({"home": true, "tool": "tip", "wait": true, "speed": 0.5}));
+    panel.send("goto", &json!({"home": true, "tool": "tip", "wait": true, "speed": 0.2}));
     panels.until_in_motion();
     panel.does("hold", &json!({"wait": true}), "superseded");
     assert_eq!(panel.answer().0, "done");
@@ -380,19 +384,28 @@ fn a_member_of_the_group_moves_the_platform_and_nobody_else_does() {
             sleep(Duration::from_millis(5));
         }
     };
-    says("step z_m=0.01", "accepted active");
+    let z = || {
+        let shown = host.run(MALLORY, &[NOGROUP], &["status", &name, "--json"]);
+        let shown: Value = serde_json::from_str(&shown.stdout).expect("JSON");
+        shown["status"]["pose"][5].as_f64().expect("a pose")
+    };
+    let until = |words: &str, is_there: &dyn Fn(f64) -> bool| {
+        let began = Instant::now();
+        while !is_there(z()) {
+            assert!(began.elapsed() < HANG, "{words}: {}", z());
+        }
+    };
     says("goto 5", "not understood");
-    says("jog z_m_s=0.02", "accepted active");
-    sleep(Duration::from_millis(400));
+    says("jog z_m_s=0.02", "");
+    until("a jog", &|z| z > 0.005);
     says("", "done active");
     says("hold", "the platform stands under control");
+    let stands = z();
+    says("step z_m=0.01", "accepted active 0.");
+    until("a step", &|z| (z - stands - 0.01).abs() < 1e-4);
     says("stop", "done standby");
     drop(keys);
     assert!(member.ends_within(HANG).status.success());
-    let shown = host.run(MALLORY, &[NOGROUP], &["status", &name, "--json"]);
-    let shown: Value = serde_json::from_str(&shown.stdout).expect("JSON");
-    let z = shown["status"]["pose"][5].as_f64().expect("a pose");
-    assert!(z > 0.012 && z < 0.05, "a step of 10 mm and a jog: {z}");
     service.stops_on("TERM", HANG);
     plant.stops_on("TERM", HANG);
 }

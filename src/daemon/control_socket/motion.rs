@@ -67,6 +67,12 @@ impl Motions {
         self.running.is_some()
     }
 
+    /// Process of the client of the motion, if it is connected.
+    pub fn client(&self, connections: &[u64]) -> Option<u32> {
+        let running = self.running.as_ref().filter(|running| connections.contains(&running.connection))?;
+        u32::try_from(running.process_id).ok().filter(|process_id| *process_id > 0)
+    }
+
     /// Ends the wait for control of all motions, because a request has ended control.
     pub fn stop(&mut self) {
         self.is_stopped = true;

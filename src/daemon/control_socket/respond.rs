@@ -28,6 +28,7 @@ impl Server<'_> {
         status: &mut Option<AnswerLine>,
     ) -> bool {
         if line.request == "status" {
+            self.status.mover = self.motions.client(&self.connection_ids);
             let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
             return connection.send(answer);
