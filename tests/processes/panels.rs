@@ -202,9 +202,10 @@ fn a_target_is_reached_in_the_coordinates_of_the_request() {
 fn a_jog_ends_without_messages_and_with_its_connection() {
     let _turn = turns::beside_others();
     let panels = Panels::start("panel-jog");
-    let (mut panel, mut other) = (panels.client(), panels.client());
+    let mut panel = panels.client();
     panel.does("hold", &json!({"engage": true, "wait": true}), "done");
     // The motion belongs to its connection.
+    let mut other = panels.client();
     for (request, more) in
         [("goto", json!({"home": true})), ("hold", json!({})), ("jog", json!({"rate": {}}))]
     {
@@ -287,11 +288,12 @@ fn a_later_motion_takes_over_and_a_stop_ends_it() {
 fn a_stop_ends_the_wait_for_control() {
     let _turn = turns::beside_others();
     let panels = Panels::with("panel-stop", "[limits]\nautonomous_scale = 0.02\n");
-    let (mut panel, mut other) = (panels.client(), panels.client());
+    let mut panel = panels.client();
     panel.does("hold", &json!({"engage": true, "wait": true}), "done");
     let away = json!({"target": {"z_m": 0.03}, "wait": true});
     panel.does("goto", &away, "done");
     // It takes seconds, and until then no motion takes control.
+    let mut other = panels.client();
     other.does("park", &json!({}), "accepted");
     let back = json!({"target": {"z_m": 0.03}, "wait": true, "engage": true, "progress": true});
     panel.send("goto", &back);
