@@ -75,7 +75,7 @@
 //! | home | configured pose from which the machine starts and to which it parks |
 //! | in position | the measured pose has been within a tolerance of an unchanged setpoint for the settling time, `[in_position]` |
 //! | innovation | measured minus predicted tracking error |
-//! | jog | motion by keys, while they are held |
+//! | jog | motion by keys or requests, while they arrive |
 //! | kinematic state | pose with its leg lengths and the factorization of N, see [`model::kinematic_state`] |
 //! | lane | element of a SIMD vector; one leg each |
 //! | leg masses | effective mass that each actuator moves at home |

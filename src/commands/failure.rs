@@ -5,8 +5,10 @@ use core::error::Error;
 use crate::config::ConfigError;
 use crate::daemon::DaemonError;
 use crate::daemon::control_socket::location::SocketError;
+use crate::daemon::target_source::TargetError;
 use crate::messages::PortError;
 use crate::operator::OperatorError;
+use crate::operator::protocol::RequestResult;
 use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 use crate::recording::RecordingError;
@@ -87,5 +89,15 @@ impl CommandError for FileError {
 impl CommandError for OperatorError {
     fn has_begun(&self) -> bool {
         !matches!(self, Self::NoDaemon(_) | Self::NoMachine | Self::Several(_) | Self::Forbidden { .. })
+    }
+}
+
+impl CommandError for TargetError {
+    fn has_begun(&self) -> bool {
+        match self {
+            Self::Port(_) | Self::Simulated => false,
+            Self::Operator(error) => error.has_begun(),
+            _ => self.result() != RequestResult::Invalid,
+        }
     }
 }

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::arguments::MachineFile;
-use super::coordinates::FrameOptions;
 use super::failure::{CommandError, Failure};
+use super::frame_options::FrameOptions;
 use super::machine_file::{difference, with_frame, write_new};
-use super::target::{TargetError, pose_of, reference_x};
 use crate::config::Config;
 use crate::config::frames::{FrameKind, NamedFrame};
+use crate::daemon::target_source::{Observation, TargetError};
 use crate::model::rigid::Pose;
-use crate::model::task::task_coordinates;
+use crate::model::task::{pose_of, task_coordinates};
 use crate::motion::frames::Frames;
 use crate::operator::requests::status;
 use crate::output::files::print;
@@ -86,7 +86,8 @@ impl SetArguments {
         let kind = self.kind(&config)?;
         let frames = config.frames_named(self.frames.tool.as_deref(), self.frames.work.as_deref())?;
         let answer = status(&config.name)?;
-        let here = reference_x(&config, &answer).ok_or(TargetError::UnknownPose(answer.text))?;
+        let seen = Observation::of_answer(&answer, 0, &config.machine.home);
+        let here = seen.and_then(|seen| seen.reference).ok_or(TargetError::UnknownPose(answer.text))?;
         let x = task_coordinates(&frame_here(&frames, kind, &pose_of(&here)), &[0.0; 6]);
         let text = with_frame(&config.text, &NamedFrame { name: self.name, kind, x })?;
         Config::parse(&text, "the new machine file")?;

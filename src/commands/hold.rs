@@ -6,17 +6,21 @@ use clap::Args;
 
 use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
-use super::target::{TargetError, TargetSource, constants};
-use crate::analysis::target_motion::check_target;
-use crate::commands::target::pose_of;
+use super::motion_client::{MotionClient, MotionError};
+use super::request::machine_name;
 use crate::control::signals::state::Request;
 use crate::operator::Order;
+use crate::operator::motion_fields::HOLD;
+use crate::operator::protocol::RequestLine;
 use crate::operator::stops::stop_machine;
 use crate::output::files::print;
 use crate::realtime::stop_request::Stop;
 
 /// Longest wait for the stop at the end.
 const STOP_LIMIT: Duration = Duration::from_secs(30);
+
+/// Interval at which the state is read.
+const STATUS_INTERVAL: Duration = Duration::from_millis(200);
 
 #[derive(Debug, Args)]
 pub struct HoldArguments {
@@ -32,26 +36,26 @@ pub struct HoldArguments {
 
 impl HoldArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
-        let constants = constants(&config);
-        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
-        let mut source = TargetSource::open(&config, within, &stop)?;
-        let x = source.resting_x(&constants)?;
-        check_target(&constants, &pose_of(&x)).map_err(TargetError::Refused)?;
-        let mut has_control = false;
+        let (machine, stop) = (machine_name(self.machine.path())?, Stop::on_signals()?);
+        let mut client = MotionClient::connect(&machine, &stop)?;
+        let Self { engage, within: within_s, .. } = self;
+        match client.carry_out(RequestLine { engage, within_s, ..RequestLine::new(HOLD) }, |_| Ok(())) {
+            Ok(_) => print("the platform stands under control; Ctrl-C ends it with a stop\n")?,
+            // A stop follows, because control may have been taken just now.
+            Err(MotionError::Interrupted | MotionError::InterruptedEarly) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let has_control = client.status_under_control().is_ok();
         while !stop.is_requested() {
-            source.publish(x)?;
-            if source.active_since().is_some() && !has_control {
-                has_control = true;
-                print("the platform stands under control; Ctrl-C ends it with a stop\n")?;
-            }
+            client.status_under_control()?;
+            stop.wait(STATUS_INTERVAL);
         }
         // The wait for this stop must not end by the signal that has caused it.
         let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT };
-        let outcome = stop_machine(&config.name, &order, &|| false);
+        let outcome = stop_machine(&machine, &order, &|| false);
         if !has_control {
             // Without control there is nothing to stop, unless control was taken just now.
-            return Err(TargetError::InterruptedEarly.into());
+            return Err(MotionError::InterruptedEarly.into());
         }
         Ok(print(format_args!("{}\n", outcome?))?)
     }

@@ -26,6 +26,7 @@ use self::reader::{SectionReader, ViolationLog};
 mod bound;
 pub mod changes;
 pub mod control_loops;
+pub mod coordinates;
 pub mod deployment;
 pub mod examination;
 pub mod fidelity;

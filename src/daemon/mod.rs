@@ -34,8 +34,11 @@ mod hints;
 mod io_thread;
 mod log_thread;
 mod memory_queue;
+pub mod motion_requests;
 mod parameters;
+pub mod precheck;
 pub mod process_names;
+pub mod rate_change;
 pub mod recorder;
 pub mod reload;
 pub mod replay;
@@ -44,10 +47,11 @@ mod snapshot;
 pub mod start;
 mod statistics;
 mod supervision;
+pub mod target_source;
 mod threads;
 pub mod time_histogram;
 
-pub use self::parameters::{nanoseconds, parameters, timing};
+pub use self::parameters::{constants, nanoseconds, parameters, timing};
 
 /// Name of the real-time thread. Other programs find a running daemon by it.
 pub const REALTIME_THREAD: &str = "hexad-rt";

@@ -4,8 +4,10 @@ use core::f64::consts::TAU;
 
 use nalgebra::Vector6;
 
+use crate::config::Config;
 use crate::config::control_loops::longest_age_s;
 use crate::config::deployment::Deployment;
+use crate::control::constants::Constants;
 use crate::control::law::Law;
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::estimator::covariance::NoiseModel;
@@ -15,6 +17,11 @@ use crate::control::signals::pair::Pair;
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
 use crate::realtime::cyclic::{ReleaseMode, Timing};
+
+/// Constants of the controller, for motions of its reference, which do not depend on the fidelity.
+pub fn constants(config: &Config) -> Constants {
+    Constants::new(&config.machine, parameters(&config.machine, &config.deployment, Fidelity::Exact))
+}
 
 /// Parameters of the controller. `fidelity` is the result of the deployment's choice.
 pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity) -> Parameters {

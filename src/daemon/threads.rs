@@ -20,6 +20,7 @@ use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
 use super::log_thread::{self, LogLinks, LogReport};
 use super::memory_queue::{MemoryProducer, MemoryQueue};
+use super::motion_requests;
 use super::parameters::{nanoseconds, timing};
 use super::recorder::{Folders, Recorder, RecorderReport};
 use super::reload::handover::{Handover, Offer, OfferQueue};
@@ -105,6 +106,8 @@ pub(super) fn run(
     let (delay_producer, delays) = delay_queue.split();
     let (statistics_writer, statistics) = triple_buffer(StatisticsMessage::default());
     let (snapshot_writer, snapshots) = triple_buffer(Snapshot::default());
+    let ((motion_snapshots, motion_reader), (jobs, received_jobs)) =
+        (triple_buffer(Snapshot::default()), channel());
     let (latch, latch_link) = latch
         .map(|latch| {
             let (link, changes) = latch_link();
@@ -158,6 +161,8 @@ pub(super) fn run(
         request_reload: request_reload.clone(),
         reloaded,
         windows: recorder_links.orders,
+        jobs,
+        motion_snapshots,
         is_ending: &flags.is_ending,
     };
     let reload_links =
@@ -171,6 +176,8 @@ pub(super) fn run(
             control_socket::run(loaded.clone(), control_links, &flags.stop_control);
         };
         spawn(threads, "hexad-reload", || reload::run(loaded.clone(), &mut offer, reload_links))?;
+        let home = config.machine.home;
+        spawn(threads, "hexad-motion", move || motion_requests::run(home, &received_jobs, motion_reader))?;
         let control = spawn(threads, "hexad-control", run_control)?;
         let recorder = spawn(threads, "hexad-recorder", || {
             prepare_support(realtime, RECORDS_PRIORITY);

@@ -131,6 +131,11 @@ impl TaskState {
     }
 }
 
+/// The pose of X.
+pub fn pose_of(x: &[f64; 6]) -> Pose {
+    TaskState::at_rest(*x).motion().pose
+}
+
 /// Task coordinates of a pose. Two triples of Bryan angles (plus full turns) give the same R; the triple
 /// nearest to `near` is returned, so that a continuous motion has continuous angles.
 ///

@@ -15,6 +15,7 @@ use crate::control::signals::state::Request;
 pub mod connection;
 pub mod endpoint;
 mod exchange;
+pub mod motion_fields;
 pub mod protocol;
 pub mod requests;
 pub mod signal;

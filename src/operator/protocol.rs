@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::motion_fields::{FrameField, RateFields, TargetFields};
 use super::status_report::StatusReport;
 use crate::control::signals::state::{Request, State};
 
@@ -17,12 +18,12 @@ pub const VERSION: u32 = 1;
 const DEFAULT_WITHIN_S: f64 = 30.0;
 
 /// Line of a client.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RequestLine {
     /// Version of the protocol.
     pub version: u32,
-    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status` or `record`.
+    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status`, `record`, `goto`, `hold` or `jog`.
     pub request: String,
     /// Whether the answer comes only when the request has ended: its state is reached, or cannot be.
     #[serde(default)]
@@ -39,6 +40,42 @@ pub struct RequestLine {
     /// Length of a recording \[s\]; `None` for all cycles that are kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,
+    /// Whether a motion takes control, if the platform is not under control. `within_s` bounds the wait for it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub engage: bool,
+    /// Tool that the coordinates describe; `None` for the platform.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<FrameField>,
+    /// Frame of the coordinates; `None` for the base frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work: Option<FrameField>,
+    /// Order of the rotations by the angles; `None` for `xyz`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<String>,
+    /// Coordinates of `goto`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetFields>,
+    /// Whether the coordinates are added to those of the target that is held, else of the platform.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub relative: bool,
+    /// Whether the coordinates that are not given are those of home.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub home: bool,
+    /// Share of the limits of autonomous motions; `None` for 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f64>,
+    /// Distance from the target at which the platform is in position \[m\], the angle in proportion; `None` for
+    /// `in_position.tolerance_m`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance_m: Option<f64>,
+    /// Rates of `jog`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<RateFields>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 fn default_within_s() -> f64 {
@@ -48,16 +85,7 @@ fn default_within_s() -> f64 {
 impl RequestLine {
     /// A request with an immediate answer.
     pub fn new(request: &str) -> Self {
-        let (wait, until_ready, progress) = (false, false, false);
-        Self {
-            version: VERSION,
-            request: request.into(),
-            wait,
-            until_ready,
-            progress,
-            within_s: DEFAULT_WITHIN_S,
-            last_s: None,
-        }
+        Self { version: VERSION, request: request.into(), within_s: DEFAULT_WITHIN_S, ..Self::default() }
     }
 
     /// Reads a line.

@@ -67,9 +67,9 @@ pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
 
 /// The status of the daemon that listens at an endpoint.
 pub fn status_of(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
-    ask_at(endpoint, Endpoint::connect_to_read, |connection| {
+    ask_at(endpoint, Endpoint::connect_to_read, |mut connection| {
         let until = Instant::now() + FIRST_LINE_LIMIT;
-        converse(connection, &RequestLine::new("status"), until, FIRST_LINE_LIMIT, || false, |_| ())
+        converse(&mut connection, &RequestLine::new("status"), until, FIRST_LINE_LIMIT, || false, |_| ())
     })
 }
 
@@ -88,18 +88,25 @@ pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError>
     }
 }
 
+/// Connects to the first daemon that counts.
+pub fn connect(machine: &str) -> Result<Connection, OperatorError> {
+    first_answer(machine, |endpoint| ask_at(endpoint, Endpoint::connect, |connection| Ok(Some(connection))))
+}
+
 /// The answer of the first daemon that counts. `ask` sends a request over a connection.
 pub fn ask_first(
     machine: &str,
     mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
 ) -> Result<AnswerLine, OperatorError> {
-    first_answer(machine, |endpoint| ask_at(endpoint, Endpoint::connect, &mut ask))
+    first_answer(machine, |endpoint| {
+        ask_at(endpoint, Endpoint::connect, |mut connection| ask(&mut connection))
+    })
 }
 
-fn first_answer(
+fn first_answer<T>(
     machine: &str,
-    mut ask: impl FnMut(&Endpoint) -> Result<AnswerLine, OperatorError>,
-) -> Result<AnswerLine, OperatorError> {
+    mut ask: impl FnMut(&Endpoint) -> Result<T, OperatorError>,
+) -> Result<T, OperatorError> {
     let mut failure = OperatorError::NoDaemon(machine.into());
     for endpoint in endpoints(Some(machine)) {
         match ask(&endpoint) {
@@ -116,18 +123,18 @@ fn first_answer(
     Err(failure)
 }
 
-fn ask_at(
+fn ask_at<T>(
     endpoint: &Endpoint,
     connect: impl Fn(&Endpoint) -> io::Result<Attempt>,
-    mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
-) -> Result<AnswerLine, OperatorError> {
+    mut ask: impl FnMut(Connection) -> io::Result<Option<T>>,
+) -> Result<T, OperatorError> {
     let mut reason = "it accepts nobody".to_owned();
     for _ in 0..ATTEMPTS {
         match connect(endpoint) {
             Ok(Attempt::Connected(connection)) if !endpoint.counts(&connection) => {
                 return Err(Stranger::at(endpoint, &connection, "nothing was sent").error("the request"));
             }
-            Ok(Attempt::Connected(mut connection)) => match ask(&mut connection) {
+            Ok(Attempt::Connected(connection)) => match ask(connection) {
                 Ok(Some(answer)) => return Ok(answer),
                 Ok(None) => {
                     reason = "is it stopped, or its log blocked?".into();

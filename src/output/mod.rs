@@ -2,6 +2,7 @@
 
 pub mod axis;
 pub mod charts;
+pub mod coordinate_rows;
 mod csv_columns;
 mod csv_groups;
 pub mod csv_rows;

@@ -41,7 +41,7 @@ fn every_line_has_its_answer() {
         ),
         (
             request("dance", json!({})),
-            "unknown request \"dance\"; must be one of status, record, reload, engage, clear, park, stop, off, estop",
+            "unknown request \"dance\"; must be one of status, record, reload, goto, hold, jog, engage, clear, park, stop, off, estop",
         ),
         (request("estop", json!({"wiat": true})), "unknown field `wiat`"),
     ] {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use hexad::commands::coordinates::Coordinates;
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::commands::orientation::OrientationFormat;
 use hexad::config::Config;
+use hexad::config::coordinates::Coordinates;
 
 use crate::support::children::{HANG, Hexad, run};
 use crate::support::machine::Machine;

@@ -41,6 +41,7 @@ mod other_users;
 mod other_version;
 mod overruns;
 mod pages;
+mod panels;
 mod paused;
 mod players;
 mod readme;

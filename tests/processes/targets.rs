@@ -218,7 +218,10 @@ fn a_hold_ends_with_a_stop() {
     // It is the source that counts, as long as it runs.
     let Ended { status: code, stderr, .. } = goto(&machine, &["--relative", "--x", "10mm"]);
     assert_eq!(code.code(), Some(1), "{stderr}");
-    assert!(stderr.contains("(hexad) publishes setpoints; end it first"), "{stderr}");
+    assert!(
+        stderr.contains(&format!("a hold of process {} is in progress; end it first", hold.id())),
+        "{stderr}"
+    );
     is_at(&machine, 3, 1.1);
     // By then it has noticed it, too.
     let_pass(Duration::from_millis(500));

@@ -1,35 +1,32 @@
 //! `hexad goto`: moves the platform, or a tool, to a pose and holds it there under control.
 //!
-//! Before the platform moves, the reference generator computes the whole motion offline. A target or a path outside the
-//! workspace is refused with leg, value and bound. `--dry-run` only prints the motion. A tool moves along a straight path.
-
-use std::time::Duration;
+//! The daemon computes the whole motion before the platform moves. A target or a path outside the workspace is refused with
+//! leg, value and bound. `--dry-run` computes it here and only prints it. A tool moves along a straight path.
 
 use clap::Args;
 
-use self::drive::{Goal, drive};
-use self::plan::{Plan, both_coordinates};
-use self::stream::Stream;
+use self::plan::PlanText;
+use self::pose_options::PoseOptions;
 use super::arguments::{MachineFile, duration, number_within};
-use super::coordinates::{Coordinates, FrameOptions};
 use super::failure::Failure;
+use super::frame_options::FrameOptions;
+use super::motion_client::MotionClient;
 use super::quantity::length_within;
-use super::target::pose_options::PoseOptions;
-use super::target::{TargetError, TargetSource, constants, is_reached, pose_of, reference_x, target_x};
-use crate::analysis::target_motion::{TargetMotion, TargetRefusal, target_motion};
-use crate::analysis::tool_motion::ToolMotion;
 use crate::config::Config;
-use crate::control::constants::Constants;
-use crate::control::supervision::in_position::InPositionWindow;
-use crate::motion::tool_path::ToolPath;
+use crate::daemon::constants;
+use crate::daemon::motion_requests::order::GotoOrder;
+use crate::daemon::motion_requests::plan::{GotoPlan, window};
+use crate::daemon::target_source::Observation;
+use crate::operator::motion_fields::{GOTO, TargetFields};
+use crate::operator::protocol::{AnswerLine, RequestLine};
 use crate::operator::requests::status;
+use crate::output::coordinate_rows::{heading, row};
 use crate::output::files::print;
 use crate::output::numbers::MotionDigits;
 use crate::realtime::stop_request::Stop;
 
-mod drive;
 mod plan;
-mod stream;
+mod pose_options;
 
 #[derive(Debug, Args)]
 pub struct GotoArguments {
@@ -71,94 +68,66 @@ impl GotoArguments {
             });
         }
         let config = self.machine.load()?;
-        let (coordinates, constants) = (self.frames.coordinates(&config)?, constants(&config));
-        let digits = MotionDigits::new(config.resolution());
-        let ([from, base], origin) = self.start(&config, &constants)?;
-        let base = if self.home { config.machine.home } else { base };
-        let to = coordinates.platform_x(&self.target.applied_to(coordinates.tool_x(&base), self.relative));
-        let refused = |refusal: TargetRefusal| match self.frames.is_empty() {
-            true => TargetError::Refused(refusal),
-            false => TargetError::RefusedInFrames(refusal, both_coordinates(&coordinates, digits, &to)),
-        };
-        let (motion, stream) =
-            self.motion(&config, &constants, &coordinates, [from, to]).map_err(|error| match error {
-                TargetError::Refused(refusal) => refused(refusal),
-                other => other,
-            })?;
-        let window = self.window(&config);
         if self.dry_run {
-            return Ok(print(Plan {
-                constants: &constants,
-                coordinates: &coordinates,
-                digits,
-                window: &window,
-                from: &from,
-                origin,
-                to: &to,
-                speed: self.speed,
-                motion: &motion,
-                is_straight: stream.is_some(),
-            })?);
+            return self.print_plan(&config);
         }
-        print(format_args!("{:.2} s to the target\n", motion.duration_s))?;
-        let stop = Stop::on_signals()?;
-        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
-        let mut source = TargetSource::open(&config, within, &stop)?;
-        source.set_speed(self.speed);
-        let goal = Goal {
+        let (coordinates, stop) = (self.frames.coordinates(&config)?, Stop::on_signals()?);
+        let mut client = MotionClient::connect(&config.name, &stop)?;
+        let arrived = client.carry_out(self.line(&config)?, |text| {
+            // The platform moves, so a closed standard output is not a failure.
+            let _ = print(format_args!("{text}\n"));
+            Ok(())
+        })?;
+        let AnswerLine { status, .. } = client.status_under_control()?;
+        let report = status.unwrap_or_default();
+        let pose = coordinates.tool_x(&report.pose.unwrap_or_default());
+        let pose = heading(&coordinates.label) + &row("pose", &pose, MotionDigits::new(report.resolution));
+        let _ = print(format_args!("{}\n{pose}", arrived.text));
+        Ok(())
+    }
+
+    /// The request.
+    fn line(&self, config: &Config) -> Result<RequestLine, Failure> {
+        let [tool, work] = self.frames.fields(config)?;
+        Ok(RequestLine {
+            engage: self.engage,
+            within_s: self.within,
+            tool,
+            work,
+            target: Some(TargetFields::new(self.target.coordinates())),
+            relative: self.relative,
+            home: self.home,
+            speed: Some(self.speed),
+            tolerance_m: self.tolerance,
+            ..RequestLine::new(GOTO)
+        })
+    }
+
+    /// Prints the motion that the request would begin.
+    fn print_plan(&self, config: &Config) -> Result<(), Failure> {
+        let (coordinates, constants) = (self.frames.coordinates(config)?, constants(config));
+        let home = config.machine.home;
+        let seen = status(&config.name).ok().and_then(|answer| Observation::of_answer(&answer, 0, &home));
+        let origin = if seen.is_some() { "where the platform is" } else { "home, as no daemon answers" };
+        let seen = seen.unwrap_or_else(|| Observation { reference: Some(home), ..Observation::default() });
+        let order = GotoOrder {
+            target: self.target.coordinates(),
+            relative: self.relative,
+            home: self.home,
+            speed: self.speed,
+            tolerance_m: self.tolerance,
+        };
+        let is_straight = self.frames.tool.is_some();
+        let plan = GotoPlan::new(config, &constants, &order, &coordinates, is_straight, &seen)?;
+        Ok(print(PlanText {
+            plan: &plan,
+            window: &window(config, self.tolerance),
             constants: &constants,
             coordinates: &coordinates,
-            from,
-            to,
-            window,
-            duration_s: motion.duration_s,
-        };
-        Ok(drive(source, &goal, stream, &stop)?)
-    }
-
-    /// The motion to the target: of the reference, or of a tool along a straight path, with its setpoints.
-    fn motion(
-        &self,
-        config: &Config,
-        constants: &Constants,
-        coordinates: &Coordinates,
-        [from, to]: [[f64; 6]; 2],
-    ) -> Result<(TargetMotion, Option<Stream>), TargetError> {
-        let [from, to] = [from, to].map(|x| pose_of(&x));
-        if self.frames.tool.is_none() {
-            return Ok((target_motion(constants, &from, &to, self.speed, |_, _| ())?, None));
-        }
-        let path = ToolPath::new(coordinates.frames(), &from, &to);
-        let stream = Stream::new(config, ToolMotion::fastest(constants, path, self.speed)?)?;
-        Ok((stream.motion().survey(constants), Some(stream)))
-    }
-
-    /// When the platform counts as arrived.
-    fn window(&self, config: &Config) -> InPositionWindow {
-        let InPositionWindow { tolerance_m, tolerance_rad, settling_ns } = config.deployment.in_position;
-        let wanted_m = self.tolerance.unwrap_or(tolerance_m);
-        let tolerance_rad = tolerance_rad * wanted_m / tolerance_m;
-        InPositionWindow { tolerance_m: wanted_m, tolerance_rad, settling_ns }
-    }
-
-    /// X at the beginning of the motion, X to which coordinates are added, which is the target that is held if there is
-    /// one, and the origin of the first as text. A motion from a target that is reached begins there, without the noise of its
-    /// measurement.
-    fn start(
-        &self,
-        config: &Config,
-        constants: &Constants,
-    ) -> Result<([[f64; 6]; 2], &'static str), TargetError> {
-        match status(&config.name) {
-            Ok(answer) => reference_x(config, &answer)
-                .map(|x| {
-                    let held = target_x(constants, &answer).unwrap_or(x);
-                    ([if is_reached(&x, &held) { held } else { x }, held], "where the platform is")
-                })
-                .ok_or(TargetError::UnknownPose(answer.text)),
-            Err(_) if self.dry_run => Ok(([config.machine.home; 2], "home, as no daemon answers")),
-            Err(error) => Err(error.into()),
-        }
+            digits: MotionDigits::new(config.resolution()),
+            origin,
+            speed: self.speed,
+        })?)
     }
 }
 

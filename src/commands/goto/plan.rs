@@ -2,33 +2,30 @@
 
 use core::fmt;
 
-use crate::analysis::target_motion::TargetMotion;
-use crate::commands::coordinates::Coordinates;
+use crate::config::coordinates::Coordinates;
 use crate::control::constants::Constants;
 use crate::control::signals::limits::Limit;
 use crate::control::supervision::in_position::InPositionWindow;
+use crate::daemon::motion_requests::plan::GotoPlan;
 use crate::model::LEGS;
-use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed, percent, significant};
+use crate::output::coordinate_rows::{heading, row};
+use crate::output::numbers::{MotionDigits, fixed, percent, significant};
 
-/// Planned motion of the reference.
-pub struct Plan<'a> {
+/// Plan as text.
+pub struct PlanText<'a> {
+    pub plan: &'a GotoPlan,
     pub window: &'a InPositionWindow,
     pub constants: &'a Constants,
     pub coordinates: &'a Coordinates,
     pub digits: MotionDigits,
-    pub from: &'a [f64; 6],
     pub origin: &'static str,
-    pub to: &'a [f64; 6],
     pub speed: f64,
-    pub motion: &'a TargetMotion,
-    /// Whether a tool moves along a straight path, as setpoints.
-    pub is_straight: bool,
 }
 
-impl fmt::Display for Plan<'_> {
+impl fmt::Display for PlanText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { constants, coordinates, digits, window, from, origin, to, speed, motion, is_straight } =
-            self;
+        let Self { plan, constants, coordinates, digits, window, origin, speed } = self;
+        let GotoPlan { from, to, motion, stream } = plan;
         let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
         let rows =
@@ -64,7 +61,7 @@ impl fmt::Display for Plan<'_> {
         }
         let scale = percent(speed * parameters.limits_scale * parameters.limits.autonomous_scale);
         let scale = format!("with {scale} of [limits] (limits.scale, limits.autonomous_scale and --speed)");
-        if *is_straight {
+        if stream.is_some() {
             return writeln!(f, "the tool goes straight, in a minimum-jerk motion {scale}");
         }
         let shares = Limit::ALL.into_iter().zip(motion.limited_shares).filter(|(_, share)| *share > 0.0);
@@ -76,33 +73,4 @@ impl fmt::Display for Plan<'_> {
         }
         writeln!(f, "limited by {limits} of the time, {scale}")
     }
-}
-
-/// Line with X in millimetres and degrees.
-pub fn row(name: &str, x: &[f64; 6], digits: MotionDigits) -> String {
-    let numbers: String = x
-        .iter()
-        .enumerate()
-        .map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, digits.of_axis(k))))
-        .collect();
-    format!("{name:10}{numbers}\n")
-}
-
-/// Heading with the names of X, above [`row`], and above it what has these coordinates, unless the label is empty.
-pub fn heading(label: &str) -> String {
-    let names: String = AXES
-        .iter()
-        .enumerate()
-        .map(|(k, axis)| format!("{:>11}", format!("{axis} {}", axis_unit(k).1)))
-        .collect();
-    let label = if label.is_empty() { String::new() } else { format!("{label}\n") };
-    format!("{label}{:10}{names}\n", "")
-}
-
-/// X of the platform in the base frame and of the tool in the work frame, below a refusal, whose bounds are of the first.
-pub fn both_coordinates(coordinates: &Coordinates, digits: MotionDigits, platform: &[f64; 6]) -> String {
-    let tool = heading(&coordinates.label) + &row("target", &coordinates.tool_x(platform), digits);
-    let text =
-        heading("coordinates of the platform in the base frame") + &row("target", platform, digits) + &tool;
-    text.trim_end().into()
 }

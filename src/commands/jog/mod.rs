@@ -1,27 +1,29 @@
 //! `hexad jog`: moves the platform by keys on a terminal, one for each direction of each axis.
 //!
-//! Dead-man control: motion continues only while keys arrive. A key moves a target, and the daemon's
-//! reference generator follows it within every limit. The target leads by at most the reference's stopping
-//! distance.
+//! Dead-man control: motion continues only while keys arrive, and while this process and its connection live. The
+//! daemon moves a target and follows it within every limit.
 
 use std::io::{self, IsTerminal};
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use self::jog_target::JogTarget;
+use self::jog_pace::{JogPace, Pace};
 use self::keys::{Key, last_key};
 use self::screen::JogScreen;
 use self::terminal::Terminal;
 use super::arguments::{MachineFile, duration};
-use super::coordinates::{Coordinates, FrameOptions};
 use super::failure::Failure;
-use super::target::{TargetError, TargetSource, constants, pose_of};
+use super::frame_options::FrameOptions;
+use super::motion_client::{MotionClient, MotionError};
+use crate::config::coordinates::Coordinates;
+use crate::operator::motion_fields::{GOTO, HOLD, JOG, RateFields, TargetFields};
+use crate::operator::protocol::{RequestLine, RequestResult};
 use crate::output::files::print;
-use crate::output::numbers::MotionDigits;
 use crate::realtime::stop_request::Stop;
 
-mod jog_target;
+mod jog_pace;
 mod keys;
 mod screen;
 mod terminal;
@@ -30,11 +32,11 @@ mod terminal;
 /// keyboard.
 const KEY_TIMEOUT: Duration = Duration::from_millis(200);
 
+/// Interval between two requests: many fit into the time after which the daemon ends a motion.
+const REQUEST_INTERVAL: Duration = Duration::from_millis(40);
+
 /// Interval between two screens, short enough for a reader.
 const SCREEN_INTERVAL: Duration = Duration::from_millis(100);
-
-/// Longest time for which a target moves in one cycle \[s\], so that it does not jump after a pause of this process.
-const MAX_STEP_S: f64 = 0.02;
 
 #[derive(Debug, Args)]
 pub struct JogArguments {
@@ -57,50 +59,77 @@ impl JogArguments {
             return Err(Failure { exit_code: 2, message });
         }
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
-        let (constants, coordinates) = (constants(&config), self.frames.coordinates(&config)?);
-        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
-        let mut source = TargetSource::open(&config, within, &stop)?;
-        let digits = MotionDigits::new(config.resolution());
-        let target = JogTarget::new(&constants, &coordinates, digits, source.resting_x(&constants)?);
-        jog(&mut source, target, &coordinates, &stop)?;
+        let coordinates = self.frames.coordinates(&config)?;
+        let mut client = MotionClient::connect(&config.name, &stop)?;
+        let (engage, within_s) = (self.engage, self.within);
+        client.carry_out(RequestLine { engage, within_s, ..RequestLine::new(HOLD) }, |_| Ok(()))?;
+        let [tool, work] = self.frames.fields(&config)?;
+        let line = RequestLine { tool, work, ..RequestLine::new("") };
+        jog(&mut client, &line, JogPace::new(&config), &coordinates, &stop)?;
         Ok(print("the platform stands under control; hexad stop or park ends it\n")?)
     }
 }
 
-/// Publishes a target moved by keys, until `q`, Esc or a signal.
+/// Sends requests by keys, until `q`, Esc or a signal. `frames` is a line with the frames.
 fn jog(
-    source: &mut TargetSource,
-    mut target: JogTarget,
+    client: &mut MotionClient,
+    frames: &RequestLine,
+    mut pace: JogPace,
     coordinates: &Coordinates,
     stop: &Stop,
 ) -> Result<(), Failure> {
     let terminal = Terminal::open().map_err(|error| Failure { exit_code: 2, message: error.to_string() })?;
-    let mut held: Option<(Key, Instant)> = None;
-    let (mut moved, mut drawn) = (Instant::now(), None::<Instant>);
+    let (mut held, mut is_jogging): (Option<(Key, Instant)>, bool) = (None, false);
+    let (mut bound, mut drawn) = (String::new(), None::<Instant>);
     while !stop.is_requested() {
-        source.publish(target.x())?;
-        let (reference, now) = (source.present_x()?, Instant::now());
         let key = last_key(&terminal.bytes());
-        if key == Some(Key::Leave) {
-            break;
-        }
         if let Some(key) = key {
-            held = target.press(key, &pose_of(&reference)).map(|key| (key, now));
+            held = None;
+            pace.press(key);
+            match (key, pace.pace()) {
+                (Key::Leave, _) => break,
+                (Key::Mode, _) => is_jogging = false,
+                (Key::Move { .. }, Pace::Continuous(_)) => {
+                    (held, is_jogging) = (Some((key, Instant::now())), true)
+                }
+                (Key::Move { axis, sign }, step) => {
+                    let target = step.along(axis, sign).map(|step| Some(step).filter(|step| *step != 0.0));
+                    let target = Some(TargetFields::new(target));
+                    bound = moved(client, RequestLine { target, relative: true, ..named(frames, GOTO) })?;
+                }
+                _ => {}
+            }
         }
-        held = held.filter(|(_, at)| at.elapsed() < KEY_TIMEOUT && source.active_since().is_some());
-        let step_s = now.duration_since(core::mem::replace(&mut moved, now)).as_secs_f64().min(MAX_STEP_S);
-        if let Some((Key::Move { axis, sign }, _)) = held {
-            target.advance(axis, sign * step_s, &pose_of(&reference));
+        held = held.filter(|(_, at)| at.elapsed() < KEY_TIMEOUT);
+        if is_jogging {
+            let rates = match held {
+                Some((Key::Move { axis, sign }, _)) => pace.pace().along(axis, sign),
+                _ => [0.0; 6],
+            };
+            let rate = Some(RateFields::new(rates));
+            bound = moved(client, RequestLine { rate, ..named(frames, JOG) })?;
         }
         if drawn.is_none_or(|drawn| drawn.elapsed() > SCREEN_INTERVAL) {
-            let answer = &source.status().newest.1;
-            let held = held.map(|(key, _)| key);
-            terminal.draw(&JogScreen { answer, target: &target, coordinates, held }.to_string());
-            drawn = Some(now);
+            let (answer, held) = (client.status_under_control()?, held.map(|(key, _)| key));
+            let screen = JogScreen { answer: &answer, pace: pace.pace(), bound: &bound, coordinates, held };
+            terminal.draw(&screen.to_string());
+            drawn = Some(Instant::now());
         }
-    }
-    if source.active_since().is_none() {
-        return Err(TargetError::InterruptedEarly.into());
+        sleep(REQUEST_INTERVAL);
     }
     Ok(())
+}
+
+fn named(frames: &RequestLine, request: &str) -> RequestLine {
+    RequestLine { request: request.into(), ..frames.clone() }
+}
+
+/// Sends a request of a motion. Returns the bound that ends it, if one does.
+fn moved(client: &mut MotionClient, line: RequestLine) -> Result<String, MotionError> {
+    let answer = client.ask(&line)?;
+    match answer.result {
+        RequestResult::Accepted if line.request == GOTO => Ok(String::new()),
+        RequestResult::Accepted | RequestResult::Invalid => Ok(answer.text),
+        _ => Err(MotionError::Failed(answer.text)),
+    }
 }

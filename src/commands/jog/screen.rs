@@ -2,24 +2,26 @@
 
 use core::fmt;
 
-use super::jog_target::{JogTarget, Pace};
+use super::jog_pace::Pace;
 use super::keys::Key;
-use crate::commands::coordinates::Coordinates;
 use crate::commands::status::screen::{legs, poses};
+use crate::config::coordinates::Coordinates;
 use crate::operator::protocol::AnswerLine as Answer;
 use crate::output::numbers::{AXES, significant};
 
 /// Content of the screen.
 pub struct JogScreen<'a> {
     pub answer: &'a Answer,
-    pub target: &'a JogTarget<'a>,
+    pub pace: Pace,
+    /// The bound that stops the motion; empty without one.
+    pub bound: &'a str,
     pub coordinates: &'a Coordinates,
     pub held: Option<Key>,
 }
 
 impl fmt::Display for JogScreen<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { answer, target, coordinates, held } = self;
+        let Self { answer, pace, bound, coordinates, held } = self;
         let Some(report) = &answer.status else { return writeln!(f, "{}", answer.text) };
         let state = answer.state.to_uppercase();
         writeln!(
@@ -32,12 +34,12 @@ impl fmt::Display for JogScreen<'_> {
         let limits =
             if report.active_limits.is_empty() { "none".into() } else { report.active_limits.join(", ") };
         writeln!(f, "{:.80}", format!("limits    {limits}"))?;
-        let bound = target.blocked().map_or_else(|| "none".into(), ToString::to_string);
+        let bound = if bound.is_empty() { "none" } else { bound.lines().next().unwrap_or_default() };
         writeln!(f, "{:.80}", format!("bound     {bound}"))?;
         poses(f, &coordinates.report(report), &coordinates.label)?;
         legs(f, report)?;
         writeln!(f, "\nup/down   x w/s   y e/d   z r/f   alpha t/g   beta y/h   gamma u/j   leave q")?;
-        let pace = match target.pace() {
+        let pace = match pace {
             Pace::Continuous([position, angle]) => format!(
                 "{} mm/s, {} deg/s while a key is held",
                 significant(position * 1e3),
@@ -64,20 +66,17 @@ impl fmt::Display for JogScreen<'_> {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
+    use crate::commands::jog::jog_pace::JogPace;
     use crate::commands::status::screen::tests::answer;
-    use crate::commands::target::constants;
     use crate::config::Config;
-    use crate::output::numbers::MotionDigits;
 
     #[test]
     fn it_fits_the_smallest_terminal() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let (constants, coordinates) = (constants(&config), Coordinates::default());
-        let digits = MotionDigits::new(config.resolution());
-        let target = JogTarget::new(&constants, &coordinates, digits, config.machine.home);
+        let (pace, coordinates) = (JogPace::new(&config).pace(), Coordinates::default());
         let held = Some(Key::Move { axis: 5, sign: -1.0 });
-        let text =
-            JogScreen { answer: &answer(), target: &target, coordinates: &coordinates, held }.to_string();
+        let text = JogScreen { answer: &answer(), pace, bound: "leg 1", coordinates: &coordinates, held }
+            .to_string();
         let widest = text.lines().map(|line| line.chars().count()).max();
         assert!(text.lines().count() <= 24 && widest <= Some(80), "{text}");
         for words in ["STOPPING", "force, force rate, stroke", "moving    z down", "setpoint", "1225.000"] {

@@ -25,8 +25,8 @@ pub(super) fn approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::commands::r#move::precheck::Precheck;
     use crate::config::Config;
+    use crate::daemon::precheck::Precheck;
     use crate::model::task::TaskState;
     use crate::motion::timeline::Timeline;
 

@@ -6,13 +6,14 @@ use std::path::Path;
 use tracing::info;
 
 use super::SetpointError;
-use super::precheck::Precheck;
 use crate::analysis::excitation_design::design;
 use crate::analysis::sampled_loop::edge;
-use crate::commands::coordinates::Coordinates;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::commands::orientation::OrientationFormat;
+use crate::commands::progress::time_bar;
 use crate::config::Config;
+use crate::config::coordinates::Coordinates;
+use crate::daemon::precheck::Precheck;
 use crate::model::task::TaskState;
 use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use crate::motion::excitation::Excitation;
@@ -111,6 +112,7 @@ impl Trajectory {
         };
         let mut errors = TableErrors::new(path);
         let mut reported = None;
+        let bar = time_bar(last - first).with_message("checking the whole motion");
         precheck.follow(
             |t| self.at(t - first),
             [first, last],
@@ -124,7 +126,9 @@ impl Trajectory {
                 }
                 ControlFlow::Continue(())
             },
+            |since_s| bar.set_position((1e3 * since_s) as u64),
         );
+        bar.finish_and_clear();
         errors.into_result()
     }
 

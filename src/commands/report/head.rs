@@ -11,8 +11,8 @@ use super::run::Run;
 use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
 use super::track::Track;
-use crate::commands::coordinates::Coordinates;
 use crate::config::Config;
+use crate::config::coordinates::Coordinates;
 use crate::control::signals::state::State;
 use crate::model::LEGS;
 use crate::output::numbers::MotionDigits;
@@ -153,7 +153,7 @@ pub fn json(value: &impl Serialize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::coordinates::tests::framed;
+    use crate::config::coordinates::tests::framed;
     use crate::model::inverse_geometry::leg_lengths;
     use crate::model::task::TaskState;
 

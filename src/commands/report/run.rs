@@ -6,9 +6,9 @@ use super::ReportError;
 use super::history::History;
 use super::levels::{self, Level};
 use super::signals::{CycleInstants, Signals};
-use crate::commands::coordinates::Coordinates;
 use crate::config::Config;
 use crate::config::changes::changes;
+use crate::config::coordinates::Coordinates;
 use crate::recording::reader::{Recording, Summary};
 use crate::recording::{Item, RecordingError, RunInfo};
 

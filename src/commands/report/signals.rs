@@ -1,8 +1,8 @@
 //! Signals of a page: numbers of one cycle, in SI units, angles in degrees.
 
 use super::references::References;
-use crate::commands::coordinates::Coordinates;
 use crate::config::Config;
+use crate::config::coordinates::Coordinates;
 use crate::control::signals::time::seconds_between;
 use crate::daemon::nanoseconds;
 use crate::messages::CycleMessage;
@@ -211,7 +211,7 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::coordinates::tests::framed;
+    use crate::config::coordinates::tests::framed;
     use crate::control::controller::Output;
     use crate::control::sensing::localization::PlatformState;
     use crate::control::signals::inputs::{Input, Measurement};

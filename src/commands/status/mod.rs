@@ -9,10 +9,11 @@ use clap::Args;
 
 use self::screen::Screen;
 use super::arguments::OptionalMachineFile;
-use super::coordinates::{Coordinates, FrameOptions};
 use super::failure::Failure;
+use super::frame_options::FrameOptions;
 use super::request::machine_name;
 use crate::config::Config;
+use crate::config::coordinates::Coordinates;
 use crate::operator::protocol::AnswerLine;
 use crate::operator::requests;
 use crate::output::files::print;

@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
-use crate::commands::coordinates::Coordinates;
 use crate::commands::report::head::json;
 use crate::commands::report::history::{Bars, History};
 use crate::commands::report::levels::{Extent, Level};
@@ -12,6 +11,7 @@ use crate::commands::report::signals::{CycleInstants, Signals};
 use crate::commands::report::summary::{Fact, live_facts};
 use crate::commands::report::track::Track;
 use crate::config::Config;
+use crate::config::coordinates::Coordinates;
 use crate::messages::{CycleMessage, LoopCounters, LoopTimes, StatusMessage};
 use crate::output::page::append_base64;
 

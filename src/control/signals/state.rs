@@ -53,6 +53,11 @@ impl State {
         matches!(self, Self::Engaging | Self::Active | Self::Stopping | Self::Parking)
     }
 
+    /// Whether the platform follows the setpoint, or moves to it.
+    pub fn follows(self) -> bool {
+        matches!(self, Self::Engaging | Self::Active)
+    }
+
     /// Name for people.
     pub fn name(self) -> &'static str {
         match self {

@@ -79,6 +79,10 @@ pub struct Connection {
     pub last_seconds: Option<LastSeconds>,
     /// The last file that the client passed.
     pub file: Option<File>,
+    /// Number of the connection.
+    pub id: u64,
+    /// Whether a motion is to be answered.
+    pub waits_for_motion: bool,
     /// Whether the client wants lines of progress before the answer.
     pub wants_progress: bool,
     buffer: Vec<u8>,
@@ -102,7 +106,7 @@ pub enum Received {
 
 impl Connection {
     /// A newly accepted connection.
-    pub fn new(stream: UnixStream, may_request: bool, now_ns: u64) -> io::Result<Self> {
+    pub fn new(stream: UnixStream, may_request: bool, id: u64, now_ns: u64) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
         let peer = Peer::of(&stream);
         Ok(Self {
@@ -114,6 +118,8 @@ impl Connection {
             reload: None,
             last_seconds: None,
             file: None,
+            id,
+            waits_for_motion: false,
             wants_progress: false,
             buffer: Vec::new(),
             line_since_ns: Some(now_ns),
@@ -125,8 +131,9 @@ impl Connection {
 
     /// Whether the client waits for an answer.
     pub fn is_waiting(&self) -> bool {
-        let Self { pending, line, reload, last_seconds, .. } = self;
-        pending.is_some() || line.is_some() || reload.is_some() || last_seconds.is_some()
+        let Self { pending, line, reload, last_seconds, waits_for_motion, .. } = self;
+        let waits = pending.is_some() || reload.is_some() || last_seconds.is_some();
+        waits || line.is_some() || *waits_for_motion
     }
 
     /// Reads at most the length of one line, and returns the next complete line.
@@ -198,7 +205,7 @@ mod tests {
 
     fn pair() -> (UnixStream, Connection) {
         let (client, server) = UnixStream::pair().unwrap();
-        (client, Connection::new(server, true, 0).unwrap())
+        (client, Connection::new(server, true, 1, 0).unwrap())
     }
 
     #[test]

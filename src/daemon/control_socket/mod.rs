@@ -19,8 +19,10 @@ use tracing::warn;
 
 use self::connection::{Connection, Received};
 use self::location::ControlSocket;
+use self::motion::Motions;
 use self::order::Step;
 use self::status::StatusSource;
+use super::motion_requests::job::Job;
 use super::recorder::WindowOrder;
 use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
@@ -28,11 +30,12 @@ use crate::messages::clock::monotonic_ns;
 use crate::messages::{MAX_REQUEST_AGE_NS, Rejection};
 use crate::operator::protocol::{AnswerLine, RequestLine};
 use crate::realtime::request_word::RequestWord;
-use crate::realtime::triple_buffer::Reader;
+use crate::realtime::triple_buffer::{Reader, Writer};
 
 mod connection;
 mod last_seconds;
 pub mod location;
+mod motion;
 mod order;
 mod reload;
 mod respond;
@@ -79,13 +82,16 @@ pub(super) struct ControlLinks<'a> {
     pub reloaded: Receiver<Reloaded>,
     /// Orders of recordings, to the recorder.
     pub windows: SyncSender<WindowOrder>,
+    /// Motions and snapshots, to the motion thread.
+    pub jobs: Sender<Job>,
+    pub motion_snapshots: Writer<Snapshot>,
     /// Set when the daemon is to end.
     pub is_ending: &'a AtomicBool,
 }
 
 /// Serves clients until `stop`.
 pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBool) {
-    let ControlLinks { socket, snapshots, word, request_reload, reloaded, windows, is_ending } = links;
+    let ControlLinks { socket, snapshots, word, request_reload, reloaded, windows, is_ending, .. } = links;
     let mut server = Server {
         socket,
         snapshots,
@@ -94,6 +100,9 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         reloaded,
         reloads: 0,
         windows,
+        motions: Motions::new(links.jobs, links.motion_snapshots),
+        connection_ids: Vec::with_capacity(2 * MAX_CONNECTIONS),
+        accepted: 0,
         is_ending,
         connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
         status: StatusSource::new(loaded),
@@ -110,6 +119,7 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         server.read();
         server.make_room();
         server.advance();
+        server.advance_motion();
         server.answer_reloads();
         server.log_rejections();
     }
@@ -125,6 +135,10 @@ struct Server<'a> {
     /// Number of reload requests so far.
     reloads: u64,
     windows: SyncSender<WindowOrder>,
+    motions: Motions,
+    /// Numbers of the connections in the last round, and of the last one accepted.
+    connection_ids: Vec<u64>,
+    accepted: u64,
     is_ending: &'a AtomicBool,
     connections: Vec<Connection>,
     status: StatusSource,
@@ -149,7 +163,7 @@ impl Server<'_> {
     /// Waits for input, or for a short time. Closes connections whose client has left.
     fn wait(&mut self) {
         let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
-        let is_pending = self.connections.iter().any(is_busy);
+        let is_pending = self.motions.is_running() || self.connections.iter().any(is_busy);
         let timeout = PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS });
         let listeners = core::iter::once(&self.socket.listener).chain(&self.socket.reading);
         let mut events: Vec<_> = listeners.map(|it| PollFd::new(it.as_fd(), PollFlags::POLLIN)).collect();
@@ -206,7 +220,9 @@ impl Server<'_> {
                 }
                 Err(_) => return,
             };
-            let Ok(mut connection) = Connection::new(stream, may_request, self.woke_ns) else { continue };
+            self.accepted += 1;
+            let connection = Connection::new(stream, may_request, self.accepted, self.woke_ns);
+            let Ok(mut connection) = connection else { continue };
             if self.receive(&mut connection, &snapshot) {
                 self.connections.push(connection);
             }

@@ -11,9 +11,11 @@ use super::reload::RELOAD;
 use super::{MAX_WITHIN_S, Server};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::state::Request;
+use crate::daemon::motion_requests::order::MotionOrder;
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::clock::monotonic_ns;
-use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
+use crate::operator::motion_fields::{GOTO, HOLD, JOG};
+use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
 
 impl Server<'_> {
     /// Responds to a line. False if the connection must be closed. `status` caches the answer to `status` for
@@ -26,6 +28,7 @@ impl Server<'_> {
         status: &mut Option<AnswerLine>,
     ) -> bool {
         if line.request == "status" {
+            self.status.mover = self.motions.client(&self.connection_ids);
             let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
             return connection.send(answer);
@@ -41,21 +44,26 @@ impl Server<'_> {
                 Err(reason) => connection.send(&AnswerLine::invalid(reason)),
             };
         }
+        if MotionOrder::is_named(&line.request) {
+            return self.begin_motion(connection, line, snapshot);
+        }
         let Some(request) = line.controller_request() else {
             let names = Request::ALL.map(Request::name).join(", ");
             let text = format!(
-                "unknown request {:?}; must be one of status, {RECORD}, {RELOAD}, {names}",
+                "unknown request {:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {names}",
                 line.request
             );
             return connection.send(&AnswerLine::invalid(text));
         };
         // Before the log, which may block.
         let answer = self.begin(connection, request, line, snapshot);
+        let is_read = self.supersede_motion(connection, snapshot);
         info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
-        answer.is_none_or(|answer| {
-            connection.peer.log_failure(&answer);
-            connection.send(&answer)
-        })
+        is_read
+            && answer.is_none_or(|answer| {
+                connection.peer.log_failure(&answer);
+                connection.send(&answer)
+            })
     }
 
     /// Posts a request, or returns the answer that refuses it.
@@ -67,19 +75,13 @@ impl Server<'_> {
         snapshot: &Snapshot,
     ) -> Option<AnswerLine> {
         let replaced = connection.pending.take();
-        if request.can_begin_control() {
-            let state = snapshot.status.state().unwrap_or_default();
-            let answer = |result, code: DiagnosticCode, text: String| {
-                Some(AnswerLine::new(result, request, state, Diagnostic::from(code), text))
-            };
-            if self.is_ending.load(Ordering::Relaxed) {
-                let code = DiagnosticCode::DaemonEnding;
-                return answer(RequestResult::Refused, code, code.name().into());
-            }
-            if self.woke_ns < self.stale_until_ns {
-                let text = "the daemon was held and the request may be old; send it again";
-                return answer(RequestResult::Stale, DiagnosticCode::None, text.into());
-            }
+        if is_stop(request) || request == Request::Park {
+            self.motions.stop();
+        }
+        if request.can_begin_control()
+            && let Some(answer) = self.refusal(request.name(), snapshot)
+        {
+            return Some(answer);
         }
         let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
         let order = Order {
@@ -92,5 +94,19 @@ impl Server<'_> {
         let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
         connection.pending = Some(pending);
         replaced.map(|replaced| replaced.superseded(snapshot))
+    }
+    /// Answer to a request that would begin control or motion, if the daemon ends, or if the request may be old.
+    pub(super) fn refusal(&self, request: &str, snapshot: &Snapshot) -> Option<AnswerLine> {
+        let state = snapshot.status.state().unwrap_or_default();
+        let answer = |result, code: DiagnosticCode, text: &str| {
+            Some(AnswerLine::named(result, request, state, Diagnostic::from(code), text.into()))
+        };
+        if self.is_ending.load(Ordering::Relaxed) {
+            let code = DiagnosticCode::DaemonEnding;
+            return answer(RequestResult::Refused, code, code.name());
+        }
+        let text = "the daemon was held and the request may be old; send it again";
+        let is_stale = self.woke_ns < self.stale_until_ns;
+        is_stale.then(|| answer(RequestResult::Stale, DiagnosticCode::None, text)).flatten()
     }
 }

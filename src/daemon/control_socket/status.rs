@@ -42,6 +42,8 @@ impl From<Diagnostic> for DiagnosticReport {
 pub struct StatusSource {
     loaded: Arc<Loaded>,
     reloads: u64,
+    /// Process of the client whose motion the daemon publishes.
+    pub mover: Option<u32>,
     /// Topics, opened at the first report; `None` if they cannot be opened: then the processes are unknown.
     topics: Option<Option<Topics>>,
 }
@@ -64,7 +66,12 @@ impl Topics {
 impl StatusSource {
     /// Source for a machine.
     pub fn new(loaded: Arc<Loaded>) -> Self {
-        Self { loaded, reloads: 0, topics: None }
+        Self { loaded, reloads: 0, mover: None, topics: None }
+    }
+
+    /// The configuration in force.
+    pub fn loaded(&self) -> &Arc<Loaded> {
+        &self.loaded
     }
 
     /// Replaces the configuration after a reload.
@@ -94,7 +101,7 @@ impl StatusSource {
         let status = &snapshot.status;
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
         let setpoint = snapshot.setpoint.filter(|setpoint| setpoint.task.is_finite());
-        let follows = matches!(status.state(), Some(State::Engaging | State::Active));
+        let follows = status.state().is_some_and(State::follows);
         let limits = Limit::ALL.into_iter().filter(|it| LimitSet(status.active_limits).contains(*it));
         StatusReport {
             version: BUILD.into(),
@@ -142,6 +149,7 @@ impl StatusSource {
         let is_simulated = config.deployment.realtime.is_simulated();
         let now_ns = measured_ns.filter(|_| is_simulated).unwrap_or(now_ns);
         let topics = self.topics.get_or_insert_with(|| Topics::open(config)).as_ref();
+        let mover = self.mover;
         let source = |topic: &str,
                       time_ns: Option<u64>,
                       of: Publishers,
@@ -149,7 +157,7 @@ impl StatusSource {
                       rejection: Option<Rejection>| SourceReport {
             topic: topic.into(),
             age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
-            processes: processes.into_iter().flatten().map(|id| process_report(id, of)).collect(),
+            processes: processes.into_iter().flatten().map(|id| process_report(id, of, mover)).collect(),
             rejected: rejection.map(|rejection| rejection.to_string()),
         };
         vec![
@@ -197,13 +205,15 @@ fn legs(snapshot: &Snapshot) -> Vec<LegReport> {
         .collect()
 }
 
-fn process_report(process_id: u32, publishers: Publishers) -> ProcessReport {
+/// A publisher. For a motion that the daemon publishes itself it is the client that has requested it.
+fn process_report(publisher: u32, publishers: Publishers, mover: Option<u32>) -> ProcessReport {
+    let process_id = mover.filter(|_| publisher == process::id()).unwrap_or(publisher);
     let user = fs::metadata(format!("/proc/{process_id}")).map(|found| user_name(found.uid()));
     ProcessReport {
         process_id,
         command: command(process_id),
         user: user.unwrap_or_default(),
-        is_ignored: process_id == publishers.ignored_pid,
+        is_ignored: publisher == publishers.ignored_pid,
     }
 }
 

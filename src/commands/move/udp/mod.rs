@@ -9,25 +9,33 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::time::Duration;
 
 use clap::Args;
 use tracing::{info, warn};
 
 use self::datagram_format::{Datagram, DatagramFormat, FormatError};
 use self::source_clock::SourceClock;
+use self::status_feed::StatusFeed;
 use super::PlaybackOptions;
 use crate::analysis::target_motion::check_target;
-use crate::commands::failure::CommandError;
+use crate::commands::failure::{CommandError, INTERRUPTED, default_exit_code};
+use crate::commands::plant::prepare_thread;
 use crate::commands::quantity::{angle, length, list};
-use crate::commands::target::{TargetError, TargetSource, constants, is_reached, pose_of};
 use crate::config::Config;
 use crate::control::parameters::ViolationPolicy;
+use crate::daemon::constants;
+use crate::daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
+use crate::messages::Bus;
 use crate::messages::clock::monotonic_ns;
+use crate::model::task::pose_of;
 use crate::motion::minimum_jerk::{rise, straight_move};
+use crate::operator::requests::status;
 use crate::realtime::stop_request::Stop;
 
 mod datagram_format;
 mod source_clock;
+mod status_feed;
 
 /// Longest time without datagrams before the platform comes to rest \[s\], if `timeouts.setpoint_ms` does not bound it.
 const PAUSE_S: f64 = 0.25;
@@ -81,6 +89,8 @@ pub enum StreamError {
     Policy,
     #[error(transparent)]
     Target(#[from] TargetError),
+    #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
+    Interrupted,
 }
 
 impl CommandError for StreamError {
@@ -90,7 +100,8 @@ impl CommandError for StreamError {
 
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Target(error) => error.exit_code(),
+            Self::Target(error) => default_exit_code(error),
+            Self::Interrupted => INTERRUPTED,
             _ => 2,
         }
     }
@@ -111,7 +122,8 @@ pub fn follow(
     let boarding = options.boarding.unwrap_or(config.machine.home);
     let constants = constants(config);
     check_target(&constants, &pose_of(&boarding)).map_err(TargetError::from)?;
-    let mut source = TargetSource::open(config, playback.engage_within(), stop)?;
+    let bus = config.join().map_err(TargetError::from)?;
+    let mut source = open_source(config, &bus, playback.engage_within(), stop)?;
     info!(%address, "moves to the boarding pose, then waits for datagrams");
     let mut phase = Phase::Boarding;
     while !stop.is_repeated() {
@@ -124,7 +136,8 @@ pub fn follow(
         match phase {
             Phase::Boarding | Phase::Leaving => {
                 source.publish(boarding)?;
-                let is_there = source.active_since().is_some() && is_reached(&source.present_x()?, &boarding);
+                let is_there =
+                    source.active_since_ns().is_some() && is_reached(&source.present_x()?, &boarding);
                 match phase {
                     Phase::Leaving if is_there => break,
                     Phase::Boarding if is_there && receiver.is_alive(now_ns) => {
@@ -158,7 +171,24 @@ pub fn follow(
         }
     }
     receiver.log_totals();
-    if stop.is_repeated() { Err(TargetError::Interrupted.into()) } else { Ok(()) }
+    if stop.is_repeated() { Err(StreamError::Interrupted) } else { Ok(()) }
+}
+
+/// The source, if no other one runs. From now on this thread must be punctual.
+fn open_source<'a>(
+    config: &'a Config,
+    bus: &Bus,
+    within: Option<Duration>,
+    stop: &Stop,
+) -> Result<TargetSource<'a, StatusFeed>, TargetError> {
+    let answer = status(&config.name)?;
+    if let Some(other) = answer.status.as_deref().and_then(other_source) {
+        return Err(TargetError::OtherSource(other));
+    }
+    let feed = StatusFeed::start(config, &answer, within, stop);
+    let source = TargetSource::open(config, bus, feed, within.is_some())?;
+    prepare_thread(config);
+    Ok(source)
 }
 
 /// What the platform does.

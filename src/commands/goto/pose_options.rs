@@ -33,15 +33,6 @@ impl PoseOptions {
         [self.alpha, self.beta, self.gamma, self.x, self.y, self.z]
     }
 
-    /// The pose of the options: each coordinate as given, or added to that of `base`.
-    pub fn applied_to(&self, base: [f64; 6], is_relative: bool) -> [f64; 6] {
-        let mut x = base;
-        for (x, given) in x.iter_mut().zip(self.coordinates()) {
-            *x = given.map_or(*x, |given| if is_relative { *x + given } else { given });
-        }
-        x
-    }
-
     /// Whether no option is given.
     pub fn is_empty(&self) -> bool {
         self.coordinates().iter().all(Option::is_none)

@@ -1,11 +1,11 @@
 //! Setpoints along the path of a tool: a target alone does not keep rotation and translation in proportion.
 
 use crate::analysis::tool_motion::ToolMotion;
-use crate::commands::r#move::precheck::Precheck;
-use crate::commands::r#move::rate_change::RateChange;
-use crate::commands::target::TargetError;
 use crate::config::Config;
 use crate::control::signals::limits::Limits;
+use crate::daemon::precheck::Precheck;
+use crate::daemon::rate_change::RateChange;
+use crate::daemon::target_source::TargetError;
 use crate::model::task::TaskState;
 
 /// Factor to the next longer duration, and number of durations: up to 30 times the shortest.
@@ -17,7 +17,7 @@ const MIN_COS_BETA: f64 = 1e-3;
 
 /// Motion of a tool that is published from its first setpoint on.
 #[derive(Clone, Copy, Debug)]
-pub struct Stream {
+pub struct ToolStream {
     motion: ToolMotion,
     /// Home, near which the angles are.
     near: [f64; 6],
@@ -27,7 +27,7 @@ pub struct Stream {
     slowdown: Option<(RateChange, u64)>,
 }
 
-impl Stream {
+impl ToolStream {
     /// The motion, as much slower as the daemon needs to follow it.
     pub fn new(config: &Config, fastest: ToolMotion) -> Result<Self, TargetError> {
         let near = config.machine.home;
@@ -50,6 +50,7 @@ impl Stream {
         Err(TargetError::NotFollowable(fastest.slower(FACTOR.powi(DURATIONS - 1)).duration_s, reason))
     }
 
+    /// The motion.
     pub fn motion(&self) -> &ToolMotion {
         &self.motion
     }
@@ -89,18 +90,20 @@ fn seconds(from_ns: u64, to_ns: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::commands::target::{constants, pose_of};
+    use crate::daemon::constants;
     use crate::model::rigid::Pose;
+    use crate::model::task::pose_of;
     use crate::motion::frames::Frames;
     use crate::motion::tool_path::ToolPath;
     use nalgebra::Vector3;
+
+    const MACHINE: &str = include_str!("../../../config/fried2008.toml");
 
     /// A tool 0.3 m from the platform's origin that turns: its origin stays to a picometre at every setpoint, also while it is
     /// interrupted, and the daemon follows.
     #[test]
     fn a_tool_stays_on_its_path_to_the_end_and_when_interrupted() {
-        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let config = Config::parse(MACHINE, "a test").unwrap();
         let constants = constants(&config);
         let tool = Pose { position: Vector3::new(0.3, 0.0, 0.0), ..Frames::default().tool };
         let frames = Frames { tool, ..Frames::default() };
@@ -108,7 +111,7 @@ mod tests {
         let turned = Pose { rotation: pose_of(&[0.05, 0.08, -0.1, 0.0, 0.0, 0.0]).rotation, ..home };
         let path = ToolPath::new(frames, &config.machine.home_pose(), &frames.platform_pose(&turned));
         let fastest = ToolMotion::fastest(&constants, path, 1.0).unwrap();
-        let planned = Stream::new(&config, fastest).unwrap();
+        let planned = ToolStream::new(&config, fastest).unwrap();
         assert!(planned.motion.duration_s < 1.3 * fastest.duration_s, "{}", planned.motion.duration_s);
         for interrupted_ns in [u64::MAX, 0, 300_000_000] {
             let (mut stream, mut resting, mut last) = (planned, None, None);
@@ -130,7 +133,7 @@ mod tests {
 
     #[test]
     fn a_way_that_leaves_the_workspace_is_refused() {
-        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let config = Config::parse(MACHINE, "a test").unwrap();
         let constants = constants(&config);
         let mut far = config.machine.home_pose();
         far.position.z += 5.0;

@@ -9,7 +9,7 @@ use core::ops::ControlFlow;
 
 use nalgebra::Vector6;
 
-use crate::commands::progress::time_bar;
+use super::parameters::parameters;
 use crate::config::Config;
 use crate::control::constants::Constants;
 use crate::control::parameters::{Envelope, Parameters};
@@ -20,7 +20,6 @@ use crate::control::setpoint::validation::{check_deviation, check_setpoint};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::Setpoint;
 use crate::control::signals::limits::{Limit, LimitSet};
-use crate::daemon;
 use crate::model::fidelity::Fidelity;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
@@ -30,8 +29,8 @@ use crate::model::task::TaskState;
 /// between two setpoints.
 const USABLE_SHARE: f64 = 0.95;
 
-/// Cycles between two updates of the progress bar: about a millisecond of effort.
-const CYCLES_PER_UPDATE: u64 = 1024;
+/// Cycles between two reports of progress: about a millisecond of effort.
+const CYCLES_PER_REPORT: u64 = 1024;
 
 /// Check of setpoints with the rules and parameters of the daemon.
 pub struct Precheck<'a> {
@@ -44,7 +43,7 @@ impl<'a> Precheck<'a> {
     pub fn new(config: &'a Config) -> Self {
         let machine = &config.machine;
         // The decision about a setpoint does not depend on the fidelity.
-        let parameters = daemon::parameters(machine, &config.deployment, Fidelity::Exact);
+        let parameters = parameters(machine, &config.deployment, Fidelity::Exact);
         Self { machine, parameters }
     }
 
@@ -76,20 +75,22 @@ impl<'a> Precheck<'a> {
     /// from `from` on.
     pub fn refusal(&self, at: impl Fn(f64) -> TaskState, span: [f64; 2]) -> Option<SetpointRefusal> {
         let mut first = None;
-        self.follow(at, span, |refusal| {
+        let refused = |refusal| {
             first = Some(refusal);
             ControlFlow::Break(())
-        });
+        };
+        self.follow(at, span, refused, |_| ());
         first
     }
 
     /// Follows the trajectory from `from` to `to`. After a refusal it continues from the refused setpoint,
-    /// unless `refused` breaks.
+    /// unless `refused` breaks. `progress` receives the time since the beginning \[s\].
     pub fn follow(
         &self,
         at: impl Fn(f64) -> TaskState,
         [from, to]: [f64; 2],
         mut refused: impl FnMut(SetpointRefusal) -> ControlFlow<()>,
+        mut progress: impl FnMut(f64),
     ) {
         let constants = Constants::new(self.machine, self.parameters);
         let period_ns = self.parameters.period_ns;
@@ -100,10 +101,9 @@ impl<'a> Precheck<'a> {
         reference.verify_start(&constants, &now.motion).ok();
         reference.begin_placed_motion(0);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
-        let bar = time_bar(to - from).with_message("checking the whole motion");
         for k in 0..=steps {
-            if k % CYCLES_PER_UPDATE == 0 {
-                bar.set_position((1e3 * self.time(0.0, k)) as u64);
+            if k % CYCLES_PER_REPORT == 0 {
+                progress(self.time(0.0, k));
             }
             let mut active_limits = LimitSet::default();
             let result = check_setpoint(self.machine, &self.parameters, &now, &mut active_limits)
@@ -120,7 +120,6 @@ impl<'a> Precheck<'a> {
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
             (before, now) = (now, setpoint(k + 1));
         }
-        bar.finish_and_clear();
     }
 
     /// Time of the k-th cycle \[s\].

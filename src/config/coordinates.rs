@@ -1,52 +1,17 @@
-//! Frames of a command: it reads and shows coordinates of a tool in a work frame.
+//! Coordinates that people and panels use: of a tool in a work frame, in an order of rotations.
 
-use clap::Args;
-
-use super::failure::CommandError;
-use super::target::pose_of;
-use crate::config::Config;
-use crate::config::frames::UnknownFrames;
+use super::Config;
 use crate::model::rigid::Twist;
-use crate::model::task::task_coordinates;
+use crate::model::task::{TaskState, pose_of, task_coordinates};
 use crate::motion::frames::Frames;
+use crate::motion::rotation_order::RotationOrder;
 use crate::operator::status_report::StatusReport;
 
-#[derive(Clone, Debug, Default, Args)]
-pub struct FrameOptions {
-    /// Coordinates describe this tool frame of the machine file, and rotations are about its origin; without it, the platform
-    #[arg(long, value_name = "NAME")]
-    pub tool: Option<String>,
-    /// Coordinates are in this work frame of the machine file; without it, in the base frame
-    #[arg(long, value_name = "NAME")]
-    pub work: Option<String>,
-}
-
-impl FrameOptions {
-    pub fn is_empty(&self) -> bool {
-        self.tool.is_none() && self.work.is_none()
-    }
-
-    /// The frames of a machine file with these names.
-    pub fn coordinates(&self, config: &Config) -> Result<Coordinates, UnknownFrames> {
-        let frames = config.frames_named(self.tool.as_deref(), self.work.as_deref())?;
-        let home = task_coordinates(&frames.tool_pose(&config.machine.home_pose()), &config.machine.home);
-        let frame = |name: &Option<String>, default: &str| name.clone().unwrap_or_else(|| default.into());
-        let (tool, work) = (frame(&self.tool, "the platform"), frame(&self.work, "the base frame"));
-        let label = if self.is_empty() { String::new() } else { format!("coordinates of {tool} in {work}") };
-        Ok(Coordinates {
-            frames: (!self.is_empty()).then_some(frames),
-            homes: [config.machine.home, home],
-            label,
-        })
-    }
-}
-
-impl CommandError for UnknownFrames {}
-
-/// Coordinates of a tool in a work frame. Without frames X stays as it is, to the bit.
+/// Coordinates of a tool in a work frame. Without frames and another order of rotations, X stays as it is, to the bit.
 #[derive(Clone, Debug, Default)]
 pub struct Coordinates {
     frames: Option<Frames>,
+    order: RotationOrder,
     /// Home of the platform and of the tool: X near which the angles are.
     homes: [[f64; 6]; 2],
     /// Text of what has these coordinates; empty without frames.
@@ -54,11 +19,28 @@ pub struct Coordinates {
 }
 
 impl Coordinates {
+    /// Coordinates of the tool of `frames` in its work frame, of the platform in the base frame without these. Their names are for
+    /// the label.
+    pub fn new(
+        config: &Config,
+        frames: Option<Frames>,
+        names: [Option<&str>; 2],
+        order: RotationOrder,
+    ) -> Self {
+        let home = frames.unwrap_or_default().tool_pose(&config.machine.home_pose());
+        let home = order.coordinates(&home, &config.machine.home);
+        let [tool, work] = names;
+        let (tool, work) = (tool.unwrap_or("the platform"), work.unwrap_or("the base frame"));
+        let label = frames.map_or_else(String::new, |_| format!("coordinates of {tool} in {work}"));
+        Self { frames, order, homes: [config.machine.home, home], label }
+    }
+
     /// Whether X describes the platform in the base frame.
     pub fn is_empty(&self) -> bool {
         self.frames.is_none()
     }
 
+    /// The tool frame and the work frame.
     pub fn frames(&self) -> Frames {
         self.frames.unwrap_or_default()
     }
@@ -66,13 +48,24 @@ impl Coordinates {
     /// X of the tool in the work frame.
     pub fn tool_x(&self, platform: &[f64; 6]) -> [f64; 6] {
         let [_, home] = &self.homes;
-        self.frames.map_or(*platform, |frames| task_coordinates(&frames.tool_pose(&pose_of(platform)), home))
+        if self.is_x() {
+            return *platform;
+        }
+        self.order.coordinates(&self.frames().tool_pose(&pose_of(platform)), home)
     }
 
     /// X of the platform in the base frame.
     pub fn platform_x(&self, tool: &[f64; 6]) -> [f64; 6] {
         let [home, _] = &self.homes;
-        self.frames.map_or(*tool, |frames| task_coordinates(&frames.platform_pose(&pose_of(tool)), home))
+        if self.is_x() {
+            return *tool;
+        }
+        let pose = self.order.motion(&TaskState::at_rest(*tool)).pose;
+        task_coordinates(&self.frames().platform_pose(&pose), home)
+    }
+
+    fn is_x(&self) -> bool {
+        self.frames.is_none() && self.order == RotationOrder::Xyz
     }
 
     /// A status report with the coordinates and errors of the tool.
@@ -99,19 +92,20 @@ impl Coordinates {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::commands::arguments::DEFAULT_CONFIG;
 
+    const MACHINE: &str = include_str!("../../config/fried2008.toml");
     const FRAMES: &str = "[[frame]]\nname = 'vertex'\nkind = 'tool'\npose = [0, 0, 0, 0.35, 0, 0]\n\
                           [[frame]]\nname = 'optics'\nkind = 'work'\npose = [0, 0, 1.5707963267948966, 1, 0, 0]\n";
 
     fn config() -> Config {
-        Config::parse(&format!("{DEFAULT_CONFIG}\n{FRAMES}"), "a test").unwrap()
+        Config::parse(&format!("{MACHINE}\n{FRAMES}"), "a test").unwrap()
     }
 
     fn coordinates(tool: Option<&str>, work: Option<&str>) -> Coordinates {
-        FrameOptions { tool: tool.map(Into::into), work: work.map(Into::into) }
-            .coordinates(&config())
-            .unwrap()
+        let config = config();
+        let frames = config.frames_named(tool, work).unwrap();
+        let frames = (tool.is_some() || work.is_some()).then_some(frames);
+        Coordinates::new(&config, frames, [tool, work], RotationOrder::Xyz)
     }
 
     /// A machine with home 1.1 m along x, and coordinates of a tool 0.35 m from it in a work frame that is turned.

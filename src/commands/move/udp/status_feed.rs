@@ -1,0 +1,100 @@
+//! Observations of the platform from the status of the daemon, received by a separate thread, so that publishing setpoints
+//! does not wait for it.
+
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{sleep, spawn};
+use std::time::Duration;
+
+use crate::commands::request::carry_out_in_background;
+use crate::config::Config;
+use crate::control::signals::state::Request;
+use crate::daemon::target_source::{Feed, Observation, TargetError};
+use crate::messages::clock::monotonic_ns;
+use crate::operator::protocol::AnswerLine as Answer;
+use crate::operator::requests::status;
+use crate::operator::{OperatorError, Order};
+use crate::realtime::stop_request::Stop;
+
+/// Interval between two requests.
+const INTERVAL: Duration = Duration::from_millis(50);
+
+/// The two newest observations.
+#[derive(Clone, Debug, Default)]
+struct Watched {
+    newest: Observation,
+    before: Option<Observation>,
+    /// Error of the last request.
+    error: Option<String>,
+}
+
+/// Receiver of the daemon's status. Its thread ends after it is dropped.
+pub struct StatusFeed {
+    shared: Arc<Mutex<Watched>>,
+    watched: Watched,
+    machine: String,
+    /// Longest wait for control; `None` once it was requested and decided.
+    within: Option<Duration>,
+    engagement: Option<Receiver<Result<(), OperatorError>>>,
+    stop: Stop,
+}
+
+impl StatusFeed {
+    /// Starts the thread with a first status.
+    pub fn start(config: &Config, first: &Answer, within: Option<Duration>, stop: &Stop) -> Self {
+        let home = config.machine.home;
+        let newest = Observation::of_answer(first, monotonic_ns(), &home).unwrap_or_default();
+        let watched = Watched { newest, ..Watched::default() };
+        let shared = Arc::new(Mutex::new(watched.clone()));
+        let (weak, machine) = (Arc::downgrade(&shared), config.name.clone());
+        let name = machine.clone();
+        spawn(move || {
+            while let Some(shared) = weak.upgrade() {
+                let requested_ns = monotonic_ns();
+                let answer = status(&name);
+                shared.lock().unwrap_or_else(PoisonError::into_inner).receive(requested_ns, answer, &home);
+                drop(shared);
+                sleep(INTERVAL);
+            }
+        });
+        Self { shared, watched, machine, within, engagement: None, stop: stop.clone() }
+    }
+}
+
+impl Feed for StatusFeed {
+    fn observe(&mut self) -> Result<(&Observation, Option<&Observation>), TargetError> {
+        self.watched.clone_from(&self.shared.lock().unwrap_or_else(PoisonError::into_inner));
+        match &self.watched.error {
+            Some(error) => Err(TargetError::NoAnswer(error.clone())),
+            None => Ok((&self.watched.newest, self.watched.before.as_ref())),
+        }
+    }
+
+    fn request_control(&mut self) -> Result<(), TargetError> {
+        let Some(timeout) = self.within else { return Ok(()) };
+        let engagement = self.engagement.get_or_insert_with(|| {
+            let order = Order { request: Request::Engage, is_patient: true, timeout };
+            carry_out_in_background(&self.machine, order, &self.stop)
+        });
+        let Ok(outcome) = engagement.try_recv() else { return Ok(()) };
+        self.within = None;
+        match outcome {
+            // The command has received the same signal.
+            Err(OperatorError::Interrupted) => Ok(()),
+            outcome => Ok(outcome?),
+        }
+    }
+}
+
+impl Watched {
+    fn receive(&mut self, requested_ns: u64, answer: Result<Answer, OperatorError>, home: &[f64; 6]) {
+        let seen = answer.map(|answer| Observation::of_answer(&answer, requested_ns, home));
+        match seen {
+            Ok(seen) => {
+                let before = core::mem::replace(&mut self.newest, seen.unwrap_or_default());
+                (self.before, self.error) = (Some(before), None);
+            }
+            Err(error) => self.error = Some(error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! `hold`: brings the platform to rest and keeps it there, until its request is ended.
+
+use super::job::{Job, JobFeed, MotionEvent};
+use crate::analysis::target_motion::check_target;
+use crate::control::constants::Constants;
+use crate::daemon::target_source::TargetError;
+use crate::messages::Bus;
+use crate::model::task::pose_of;
+
+/// Holds the platform.
+pub fn run(job: &Job, constants: &Constants, feed: JobFeed<'_>, bus: &Bus) -> Result<(), TargetError> {
+    let mut source = job.source(feed, bus, job.order.may_engage)?;
+    let x = job.start_x(&mut source, constants)?;
+    check_target(constants, &pose_of(&x))?;
+    job.send(MotionEvent::Accepted("the platform comes to rest".into()));
+    if job.rest_at(&mut source, x)? {
+        job.send(MotionEvent::Done("the platform stands under control".into()));
+        while job.end().is_none() {
+            source.publish(x)?;
+        }
+    }
+    Ok(())
+}

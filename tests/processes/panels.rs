@@ -1,0 +1,413 @@
+//! Panels move the platform over the control socket: who may, what is refused, and what ends a motion.
+
+use std::io::Write;
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use hexad::control::signals::state::State;
+use hexad::messages::SetpointMessage;
+use hexad::messages::clock::monotonic_ns;
+use hexad::model::task::TaskState;
+use serde_json::{Value, json};
+
+use crate::support::children::{HANG, Hexad};
+use crate::support::host::{Host, MALLORY, NOGROUP, SERVICE};
+use crate::support::machine::{Machine, PATIENT};
+use crate::support::operator::does;
+use crate::support::recorder::{Recorder, Recording};
+use crate::support::rules;
+use crate::support::socket::{Client, path_of, status};
+use crate::support::trio::{fastest, let_pass, start_daemon, start_plant};
+use crate::support::turns;
+
+/// A leg faster than this is in motion \[m/s\].
+const IN_MOTION: f64 = 0.002;
+
+const FRAME: &str = "
+[[frame]]
+name = \"tip\"
+kind = \"tool\"
+pose = [0.0, 0.0, 0.0, 0.3, 0.0, 0.0]
+";
+
+/// A machine that runs, with its recorder.
+struct Panels {
+    recorder: Recorder,
+    plant: Hexad,
+    daemon: Hexad,
+    machine: Machine,
+}
+
+impl Panels {
+    fn start(test: &str) -> Self {
+        Self::with(test, "")
+    }
+
+    fn with(test: &str, sections: &str) -> Self {
+        let machine = Machine::with(test, &format!("{PATIENT}{FRAME}{sections}"));
+        let recorder = Recorder::start(&machine.name);
+        let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+        daemon.says("standby: no setpoint");
+        Self { recorder, plant, daemon, machine }
+    }
+
+    fn client(&self) -> Panel {
+        Panel(Client::connect(&self.daemon))
+    }
+
+    fn x(&self) -> [f64; 6] {
+        let pose = status(&self.machine)["status"]["pose"].clone();
+        core::array::from_fn(|k| pose[k].as_f64().unwrap_or(f64::NAN))
+    }
+
+    fn until_in_motion(&self) {
+        let began_ns = monotonic_ns();
+        self.recorder.until("the platform moves", |recording| {
+            let last = recording.measured.last().filter(|last| last.header.time_ns > began_ns);
+            last.filter(|last| fastest(last) > IN_MOTION).map(drop)
+        });
+    }
+
+    /// The platform comes to rest under control and stands for a while.
+    fn until_it_stands(&self) {
+        let began_ns = monotonic_ns();
+        self.recorder.until("the platform stands", |recording| {
+            let newest = recording.measured.iter().rev().take(200);
+            let is_still = newest.clone().all(|it| it.header.time_ns > began_ns && fastest(it) < 1e-3);
+            (newest.count() == 200 && is_still).then_some(())
+        });
+        assert_eq!(status(&self.machine)["state"], "active");
+    }
+
+    /// Ends everything. No fault has occurred, and every rule holds.
+    fn finish(self) -> Recording {
+        does(&self.machine, "stop", &[], &["standby"]);
+        self.daemon.stops_on("TERM", HANG);
+        self.plant.stops_on("TERM", HANG);
+        let recording = self.recorder.finish();
+        rules::hold(&recording);
+        assert!(recording.forces.iter().all(|force| force.state != State::Fault as u32), "no fault");
+        recording
+    }
+}
+
+/// A client that is not `hexad`.
+struct Panel(Client);
+
+impl Panel {
+    fn send(&mut self, request: &str, more: &Value) {
+        let mut line = json!({"version": 1, "request": request});
+        more.as_object().expect("keys").iter().for_each(|(key, value)| line[key] = value.clone());
+        self.0.send(&format!("{line}\n"));
+    }
+
+    /// The answer to a request: its result and text.
+    fn ask(&mut self, request: &str, more: &Value) -> (String, String) {
+        self.send(request, more);
+        self.answer()
+    }
+
+    fn answer(&mut self) -> (String, String) {
+        let answer = self.0.answer();
+        let text = |key: &str| answer[key].as_str().expect("text").to_owned();
+        (text("result"), text("text"))
+    }
+
+    fn does(&mut self, request: &str, more: &Value, result: &str) -> String {
+        let (found, text) = self.ask(request, more);
+        assert_eq!(found, result, "{request} {more}: {text}");
+        text
+    }
+}
+
+#[test]
+fn a_bad_request_is_refused_with_its_field() {
+    let _turn = turns::beside_others();
+    let panels = Panels::start("panels");
+    let mut panel = panels.client();
+    for (request, more, words) in [
+        ("goto", json!({}), "target: is missing"),
+        (
+            "goto",
+            json!({"target": {"x_m": 1e300}}),
+            "target.x_m = 1e300: must be in [-1000.0, 1000.0]; send m",
+        ),
+        ("goto", json!({"target": {"x_mm": 1}}), "unknown field `x_mm`"),
+        ("goto", json!({"target": {"x_m": 1.9}}), "outside of the workspace: leg"),
+        ("goto", json!({"home": true, "speed": 2}), "speed = 2.0: must be in [0.01, 1.0]"),
+        ("goto", json!({"home": true, "tolerance_m": 0}), "tolerance_m = 0.0: must be in [1e-9, 0.1]"),
+        ("goto", json!({"home": true, "relative": true}), "exclude each other"),
+        ("goto", json!({"home": true, "rate": {}}), "rate: is no field of goto; leave it out"),
+        ("goto", json!({"home": true, "tool": "tap"}), "no tool frame \"tap\", must be one of: tip"),
+        ("goto", json!({"home": true, "rotation": "xyx"}), "rotation = \"xyx\": must be one of xyz, xzy"),
+        ("jog", json!({}), "rate: is missing"),
+        ("jog", json!({"rate": {"x_m_s": 0.3}}), "norm of x, y, z = 0.3 m/s: must be at most 0.2"),
+        ("jog", json!({"rate": {}, "engage": true}), "engage: is no field of jog"),
+        ("hold", json!({"target": {"x_m": 1}}), "target: is no field of hold"),
+    ] {
+        let text = panel.does(request, &more, "invalid");
+        assert!(text.contains(words), "{words:?} must be in {text}");
+    }
+    panel.0.send("{\"version\": 1, \"request\": \"goto\", \"target\": {\"x_m\": NaN}}\n");
+    assert_eq!(panel.answer().0, "invalid");
+    for (request, more) in
+        [("goto", json!({"home": true})), ("hold", json!({})), ("jog", json!({"rate": {"x_m_s": 0.01}}))]
+    {
+        let text = panel.does(request, &more, "refused");
+        assert!(text.contains("not under control (state standby"), "{text}");
+    }
+    assert!(panels.recorder.so_far().setpoints.is_empty(), "nothing was published");
+    panels.finish();
+}
+
+#[test]
+fn a_target_is_reached_in_the_coordinates_of_the_request() {
+    let _turn = turns::beside_others();
+    let panels = Panels::start("panel-target");
+    let mut panel = panels.client();
+    let began_ns = monotonic_ns();
+    let there = json!({"target": {"x_m": 0.02, "gamma_rad": 0.05}, "relative": true, "wait": true});
+    assert_eq!(
+        panel.does("hold", &json!({"engage": true, "wait": true}), "done"),
+        "the platform stands under control"
+    );
+    let text = panel.does("goto", &there, "done");
+    assert!(text.starts_with("in position after "), "{text}");
+    let x = panels.x();
+    assert!((x[3] - 1.12).abs() < 1e-4 && (x[2] - 0.05).abs() < 1e-4, "{x:?}");
+    // The same angles in another order are another orientation.
+    let zyx = json!({"target": {"alpha_rad": 0.1, "beta_rad": 0.1, "gamma_rad": 0.05}, "rotation": "zyx", "wait": true});
+    panel.does("goto", &zyx, "done");
+    let x = panels.x();
+    assert!((x[0] - 0.1).abs() > 1e-3 && (x[0] - 0.1).abs() < 1e-2, "{x:?}");
+    // A tool turns about its origin.
+    panel.does("goto", &json!({"home": true, "wait": true}), "done");
+    let turn = json!({"target": {"gamma_rad": 0.07, "beta_rad": -0.03}, "tool": "tip", "wait": true});
+    let turned_ns = monotonic_ns();
+    panel.does("goto", &turn, "done");
+    let recording = panels.finish();
+    assert!(recording.setpoints.iter().all(|setpoint| setpoint.header.time_ns > began_ns));
+    let moving = |it: &&SetpointMessage| it.header.time_ns > turned_ns && it.x_rate.iter().any(|x| *x != 0.0);
+    let off = recording.setpoints.iter().filter(moving).map(|setpoint| {
+        let pose = TaskState::at_rest(setpoint.x).motion().pose;
+        (pose.position + pose.rotation.column(0) * 0.3 - nalgebra::Vector3::new(1.4, 0.0, 0.0)).norm()
+    });
+    let off: Vec<f64> = off.collect();
+    let farthest = off.iter().copied().fold(0.0, f64::max);
+    assert!(off.len() > 100 && farthest < 1e-12, "{} setpoints, {farthest} m", off.len());
+}
+
+#[test]
+fn a_jog_ends_without_messages_and_with_its_connection() {
+    let _turn = turns::beside_others();
+    let panels = Panels::start("panel-jog");
+    let mut panel = panels.client();
+    panel.does("hold", &json!({"engage": true, "wait": true}), "done");
+    // The motion belongs to its connection.
+    let mut other = panels.client();
+    for (request, more) in
+        [("goto", json!({"home": true})), ("hold", json!({})), ("jog", json!({"rate": {}}))]
+    {
+        let text = other.does(request, &more, "refused");
+        assert!(text.contains(&format!("a hold of process {} is in progress", std::process::id())), "{text}");
+    }
+    let up = json!({"rate": {"z_m_s": 0.04}});
+    let jog = |panel: &mut Panel| {
+        let began_m = panels.x()[5];
+        while panels.x()[5] < began_m + 0.01 {
+            for _ in 0..5 {
+                panel.does("jog", &up, "accepted");
+                sleep(Duration::from_millis(20));
+            }
+        }
+    };
+    jog(&mut panel);
+    panels.until_it_stands();
+    let stands = panels.x();
+    let_pass(Duration::from_millis(500));
+    assert!((panels.x()[5] - stands[5]).abs() < 1e-4, "it stands: {:?}", panels.x());
+    // A connection that ends in the middle.
+    jog(&mut panel);
+    drop(panel);
+    panels.until_it_stands();
+    assert!(panels.x()[5] > stands[5] + 0.005, "{:?}", panels.x());
+    // A target that a connection waits for ends with the connection; one that it does not wait for remains.
+    let slowly = json!({"target": {"z_m": 0.0}, "speed": 0.05, "wait": true, "progress": true});
+    other.send("goto", &slowly);
+    assert_eq!(other.answer().0, "accepted");
+    panels.until_in_motion();
+    drop(other);
+    panels.until_it_stands();
+    let left = panels.x();
+    assert!(left[5] > 0.002, "on the way: {left:?}");
+    panels.client().does("goto", &json!({"target": {"z_m": 0.0}}), "accepted");
+    panels.recorder.until("the target is followed", |recording| {
+        recording.setpoints.last().filter(|last| last.x[5] == 0.0).map(drop)
+    });
+    panels.until_it_stands();
+    assert!(panels.x()[5].abs() < 1e-4, "{:?}", panels.x());
+    panels.finish();
+}
+
+/// A later motion of the same connection takes over, and a stop ends all of them.
+#[test]
+fn a_later_motion_takes_over_and_a_stop_ends_it() {
+    let _turn = turns::beside_others();
+    let panels = Panels::start("panel-later");
+    let mut panel = panels.client();
+    panel.does("goto", &json!({"home": true, "engage": true, "wait": true}), "done");
+    let step = |speed: f64| json!({"target": {"z_m": 0.03}, "relative": true, "wait": true, "speed": speed});
+    panel.send("goto", &step(0.1));
+    panels.until_in_motion();
+    panel.send("goto", &step(1.0));
+    let (first, second) = (panel.answer(), panel.answer());
+    assert_eq!((first.0.as_str(), second.0.as_str()), ("superseded", "done"), "{first:?} {second:?}");
+    // Steps add up, wherever the platform is when they arrive.
+    assert!((panels.x()[5] - 0.06).abs() < 1e-4, "{:?}", panels.x());
+    panel.send("goto", &json!({"home": true, "tool": "tip", "wait": true, "speed": 0.2}));
+    panels.until_in_motion();
+    panel.does("hold", &json!({"wait": true}), "superseded");
+    assert_eq!(panel.answer().0, "done");
+    assert!(panels.x()[5] > 0.005, "on the way: {:?}", panels.x());
+    // A motion that waits for control, and one that is under way: no stop is undone by them.
+    panel.send("goto", &json!({"home": true, "wait": true, "speed": 0.2, "engage": true}));
+    panels.until_in_motion();
+    panel.send("goto", &json!({"target": {"x_m": 1.11}, "wait": true, "engage": true}));
+    assert_eq!(panel.answer().0, "superseded");
+    let mut other = panels.client();
+    other.does("stop", &json!({"wait": true}), "done");
+    let ended = panel.answer();
+    assert!(["failed", "superseded"].contains(&ended.0.as_str()), "{ended:?}");
+    let_pass(Duration::from_millis(500));
+    assert_eq!(status(&panels.machine)["state"], "standby");
+    panels.finish();
+}
+
+#[test]
+fn a_stop_ends_the_wait_for_control() {
+    let _turn = turns::beside_others();
+    let panels = Panels::with("panel-stop", "[limits]\nautonomous_scale = 0.02\n");
+    let mut panel = panels.client();
+    panel.does("hold", &json!({"engage": true, "wait": true}), "done");
+    let away = json!({"target": {"z_m": 0.03}, "wait": true});
+    panel.does("goto", &away, "done");
+    // It takes seconds, and until then no motion takes control.
+    let mut other = panels.client();
+    other.does("park", &json!({}), "accepted");
+    let back = json!({"target": {"z_m": 0.03}, "wait": true, "engage": true, "progress": true});
+    panel.send("goto", &back);
+    assert_eq!(panel.answer().0, "accepted");
+    assert_eq!(panel.answer(), ("waiting".into(), "not possible in state parking".into()));
+    other.does("stop", &json!({"wait": true}), "done");
+    assert_eq!(panel.answer().0, "superseded");
+    let_pass(Duration::from_millis(500));
+    assert_eq!(status(&panels.machine)["state"], "standby");
+    panels.finish();
+}
+
+/// Lines without pause, valid and not, on twenty connections.
+const FLOOD: &str = r#"
+import json, random, socket, sys, threading, time
+def line(request, **more):
+    return json.dumps({"version": 1, "request": request, **more}).encode() + b"\n"
+lines = [line("jog", rate={"z_m_s": 0.01}), line("goto", home=True, wait=True), line("hold", wait=True),
+    line("goto", target={"x_m": 1e308}, relative=True), line("goto", target={"x_m": 0.001}, relative=True, tool=[0.0] * 6),
+    b'{"version": 1, "request": "jog", "rate": {"x_m_s": NaN}}\n', b'{"version": 1, "request": "goto", "wiat": 1}\n']
+def flood():
+    while True:
+        try:
+            link = socket.socket(socket.AF_UNIX)
+            link.connect(sys.argv[1])
+            link.setblocking(False)
+            for _ in range(random.randrange(1, 300)):
+                try:
+                    link.send(random.choice(lines))
+                    link.recv(1 << 16)
+                except BlockingIOError:
+                    time.sleep(0.0005)
+        except OSError:
+            time.sleep(0.001)
+for _ in range(20):
+    threading.Thread(target=flood, daemon=True).start()
+print("here", flush=True)
+time.sleep(3600)
+"#;
+
+#[test]
+fn a_flood_of_motions_disturbs_neither_the_loop_nor_a_stop() {
+    let _turn = turns::beside_others();
+    let panels = Panels::start("panel-flood");
+    panels.client().does("hold", &json!({"engage": true, "wait": true}), "done");
+    let mut flood =
+        crate::support::disturbance::python(&["/usr/bin/env"], FLOOD, &[path_of(&panels.daemon).as_os_str()]);
+    let_pass(Duration::from_secs(2));
+    assert_eq!(status(&panels.machine)["state"], "active");
+    does(&panels.machine, "stop", &[], &["standby"]);
+    let_pass(Duration::from_millis(300));
+    assert_eq!(status(&panels.machine)["state"], "standby", "none of them takes control");
+    flood.kill().expect("a signal");
+    flood.wait().expect("its end");
+    panels.finish();
+}
+
+/// The example, as a member of the group who is not the user of the daemon; beside it, the commands of that member.
+#[test]
+fn a_member_of_the_group_moves_the_platform_and_nobody_else_does() {
+    let _turn = turns::beside_others();
+    let sections = format!("{PATIENT}\n[operator]\ngroup = \"nogroup\"\n");
+    let Some(host) = Host::start(Machine::with("member", &sections)) else { return };
+    const FILE: &str = "/run/test/machine.toml";
+    let name = host.machine().name.clone();
+    host.does(&format!("mkdir -m 755 /run/hexad && chown {SERVICE}:{SERVICE} /run/hexad"));
+    let service = host.daemon(SERVICE, &[NOGROUP], None);
+    let plant = host.spawn("plant", host.hexad(SERVICE, &[], &["plant", FILE]));
+    service.says("standby: no setpoint");
+    let forbidden = host.run(MALLORY, &[], &["goto", FILE, "--home", "--engage"]);
+    let words = format!("this user may not send requests for {name}");
+    assert!(forbidden.status.code() == Some(2) && forbidden.stderr.contains(&words), "{}", forbidden.stderr);
+    let panel = |groups: &[u32]| {
+        std::fs::copy("examples/panel.py", host.machine().path("panel.py")).expect("the example");
+        let mut command = host.program(MALLORY, groups, "python3");
+        command.args(["/run/test/panel.py", &format!("/run/hexad/{name}.sock")]).stdin(Stdio::piped());
+        host.spawn("panel", command)
+    };
+    let refused = panel(&[]).ends_within(HANG);
+    assert!(refused.stderr.contains("PermissionError"), "{}", refused.stderr);
+    let moved = host.run(MALLORY, &[NOGROUP], &["goto", FILE, "--home", "--engage"]);
+    assert!(moved.status.code() == Some(0) && moved.stdout.contains("in position"), "{}", moved.stderr);
+    let mut member = panel(&[NOGROUP]);
+    let mut keys = member.input();
+    let mut says = |line: &str, words: &str| {
+        writeln!(keys, "{line}").expect("a line");
+        let began = Instant::now();
+        while !member.printed().contains(words) {
+            assert!(began.elapsed() < HANG, "{words:?} must be in {}", member.printed());
+            sleep(Duration::from_millis(5));
+        }
+    };
+    let z = || {
+        let shown = host.run(MALLORY, &[NOGROUP], &["status", &name, "--json"]);
+        let shown: Value = serde_json::from_str(&shown.stdout).expect("JSON");
+        shown["status"]["pose"][5].as_f64().expect("a pose")
+    };
+    let until = |words: &str, is_there: &dyn Fn(f64) -> bool| {
+        let began = Instant::now();
+        while !is_there(z()) {
+            assert!(began.elapsed() < HANG, "{words}: {}", z());
+        }
+    };
+    says("goto 5", "not understood");
+    says("jog z_m_s=0.02", "");
+    until("a jog", &|z| z > 0.005);
+    says("", "done active");
+    says("hold", "the platform stands under control");
+    let stands = z();
+    says("step z_m=0.01", "accepted active 0.");
+    until("a step", &|z| (z - stands - 0.01).abs() < 1e-4);
+    says("stop", "done standby");
+    drop(keys);
+    assert!(member.ends_within(HANG).status.success());
+    service.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
