@@ -47,7 +47,7 @@ impl HoldArguments {
             }
         }
         // The wait for this stop must not end by the signal that has caused it.
-        let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT };
+        let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT, remote: None };
         let outcome = stop_machine(&config.name, &order, &|| false);
         if !has_control {
             // Without control there is nothing to stop, unless control was taken just now.

@@ -39,6 +39,9 @@ pub struct RequestLine {
     /// Length of a recording \[s\]; `None` for all cycles that are kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,
+    /// Remote side for which a bridge sends the request: its own words, which nobody has verified.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remote: Option<String>,
 }
 
 fn default_within_s() -> f64 {
@@ -57,6 +60,7 @@ impl RequestLine {
             progress,
             within_s: DEFAULT_WITHIN_S,
             last_s: None,
+            remote: None,
         }
     }
 

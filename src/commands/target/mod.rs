@@ -262,7 +262,7 @@ impl<'a> TargetSource<'a> {
     fn engage(&mut self) -> Result<(), TargetError> {
         let Some(timeout) = self.within else { return Ok(()) };
         let engagement = self.engagement.get_or_insert_with(|| {
-            let order = Order { request: Request::Engage, is_patient: true, timeout };
+            let order = Order { request: Request::Engage, is_patient: true, timeout, remote: None };
             carry_out_in_background(&self.config.name, order, &self.stop)
         });
         match engagement.try_recv() {
