@@ -29,8 +29,8 @@ pub struct Bridge<'a> {
     poses: Option<Subscription<ros::PoseStamped>>,
     trajectories: Option<Subscription<ros::MultiDofTrajectory>>,
     output: Output,
-    names: NodeNames,
     rejections: RejectionLog,
+    node: BridgeNode,
 }
 
 /// From the topics of the machine to those of ROS 2.
@@ -82,7 +82,7 @@ impl<'a> Bridge<'a> {
             due_ns: 0,
         };
         for request in section.allowed_requests()? {
-            serve(config.name.clone(), request, node.trigger(request.name())?, node.names());
+            serve(config.name.clone(), request, node.trigger(request.name())?, node.names.clone());
         }
         Ok(Self {
             relay: SetpointRelay::new(config, base.clone()),
@@ -90,8 +90,8 @@ impl<'a> Bridge<'a> {
             poses: poses.transpose()?,
             trajectories: trajectories.transpose()?,
             output,
-            names: node.names(),
             rejections: RejectionLog::default(),
+            node,
         })
     }
 
@@ -116,7 +116,8 @@ impl<'a> Bridge<'a> {
     }
 
     fn receive(&mut self) {
-        let Self { relay, poses, trajectories, rejections, names, .. } = self;
+        let Self { relay, poses, trajectories, rejections, node, .. } = self;
+        let names = &node.names;
         drain(poses, rejections, names, |message, id, arrival_ns| relay.add_pose(message, id, arrival_ns));
         drain(trajectories, rejections, names, |message, id, arrival_ns| {
             relay.add_trajectory(message, id, arrival_ns)

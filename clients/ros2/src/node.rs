@@ -23,11 +23,12 @@ const PARTICIPANT_BYTES: usize = 12;
 /// Messages that are kept until they are read: those of one pass of the loop.
 pub const BUFFER: usize = 64;
 
-/// Node of one machine.
+/// Node of one machine. Its topics and services end with it.
 pub struct BridgeNode {
     node: Node,
     namespace: String,
-    names: NodeNames,
+    /// Names of other nodes.
+    pub names: NodeNames,
 }
 
 impl BridgeNode {
@@ -47,11 +48,6 @@ impl BridgeNode {
         let names = NodeNames::default();
         names.watch(&node);
         Ok(Self { node, namespace: section.namespace.clone(), names })
-    }
-
-    /// Names of other nodes.
-    pub fn names(&self) -> NodeNames {
-        self.names.clone()
     }
 
     /// Publisher of the topic `name` in the namespace, or of an absolute one.

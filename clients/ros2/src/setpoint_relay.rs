@@ -225,7 +225,7 @@ mod tests {
         let mut relay = SetpointRelay::new(&config, "base".into());
         let mut add = |message: &ros::PoseStamped, k| relay.add_pose(message, SOURCE.into(), 9000 * MS + k);
         // 10,000 messages a second, for one second.
-        let found: Vec<_> = (0..10_000).map(|k| add(&pose(1000 * MS + k), k * MS / 10)).collect();
+        let found: Vec<_> = (0..10_000).map(|k| add(&pose(1000 * MS + k * MS / 10), k * MS / 10)).collect();
         let accepted = found.iter().filter(|found| found.is_ok()).count() as u64;
         assert!((MAX_RATE_HZ..MAX_RATE_HZ + BURST + 1).contains(&accepted), "{accepted}");
         assert!(found.iter().rev().take(10).any(Result::is_ok), "none is silent");

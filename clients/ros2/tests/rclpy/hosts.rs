@@ -107,13 +107,7 @@ impl Hosts {
     }
 
     fn child(&mut self, name: &str) -> &mut Child {
-        self.processes
-            .iter_mut()
-            .rev()
-            .map(|(started, child)| (*started, child))
-            .find(|(started, _)| *started == name)
-            .unwrap()
-            .1
+        &mut self.processes.iter_mut().find(|(started, _)| *started == name).unwrap().1
     }
 
     /// Ends a process at once.
@@ -154,12 +148,6 @@ impl Hosts {
             format!("{name}:\n{}\n", lines[lines.len().saturating_sub(20)..].join("\n"))
         };
         self.processes.iter().map(|(name, _)| name).map(end).collect()
-    }
-
-    /// What a command prints.
-    pub fn output(&self, mut command: Command) -> String {
-        let ended = command.output().unwrap();
-        [ended.stdout, ended.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat()
     }
 }
 
