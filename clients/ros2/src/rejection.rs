@@ -50,7 +50,7 @@ impl RejectionLog {
     /// Counts a rejection, and logs it if its reason was not logged within the last second. `source` names the sender.
     pub fn add(&mut self, rejection: &Rejection, source: impl FnOnce() -> String) {
         if let Some(count) = self.due(rejection, Instant::now()) {
-            warn!(source = source(), count, "setpoints are rejected: {rejection}");
+            warn!(source = source(), count, "messages are rejected: {rejection}");
         }
     }
 

@@ -13,6 +13,7 @@ use ros2_client::Server;
 use tracing::{info, warn};
 
 use crate::node::NodeNames;
+use crate::rejection::{Rejection, RejectionLog};
 use crate::ros_messages::{TriggerRequest, TriggerResponse};
 
 /// Longest wait for the result of a request.
@@ -26,20 +27,23 @@ pub fn serve(
     names: NodeNames,
 ) {
     thread::spawn(move || {
+        let mut rejections = RejectionLog::default();
         loop {
             let id = match block_on(server.async_receive_request()) {
                 Ok((id, _)) => id,
                 Err(error) => {
-                    warn!("{}: a request cannot be read: {error}", request.name());
+                    rejections.add(&Rejection::Format(error.to_string()), || request.name().into());
                     continue;
                 }
             };
             let remote = names.of(&id.writer_gid);
             let outcome = carry_out_for(&machine, request, &remote);
             info!(remote, "{}: {}", request.name(), outcome.message);
-            // Those that arrived meanwhile have the same outcome: none of them is carried out later.
+            // Those that arrived meanwhile have the same outcome: none of them begins control later. Stops are carried out one by one.
             let mut waiting = vec![id];
-            while let Ok(Some((id, _))) = server.receive_request() {
+            while !is_stop(request)
+                && let Ok(Some((id, _))) = server.receive_request()
+            {
                 waiting.push(id);
             }
             for id in waiting {

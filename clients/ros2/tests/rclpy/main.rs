@@ -117,9 +117,7 @@ fn rclpy_reads_the_state_and_moves_the_platform_with_poses() {
 fn a_killed_bridge_is_a_lost_source() {
     let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     // What the state chart says of a source that ends in motion (docs/operator.md).
-    for (function, sections, ended) in
-        [("trajectory", "", "code=100"), ("disturbances", LIMIT, "code=11")]
-    {
+    for (function, sections, ended) in [("trajectory", "", "code=100"), ("disturbances", LIMIT, "code=11")] {
         let Some(mut cell) = Cell::open("killed", sections) else { return };
         cell.start_node(Host::Remote, function);
         cell.hosts.wait_for(function, "moving");
