@@ -20,6 +20,9 @@ use crate::ros_messages::{RosMessage, TriggerRequest, TriggerResponse};
 /// Number of bytes of an identity that name the process of an entity.
 const PARTICIPANT_BYTES: usize = 12;
 
+/// Largest number of processes whose nodes are known by name.
+const MAX_PROCESSES: usize = 256;
+
 /// Messages that are kept until they are read: those of one pass of the loop.
 pub const BUFFER: usize = 64;
 
@@ -105,6 +108,9 @@ impl NodeNames {
                 let NodeEvent::ParticipantEntities(process) = event else { continue };
                 let nodes: Vec<_> = process.nodes().iter().map(|node| node.fully_qualified_name()).collect();
                 let mut names = names.0.lock().unwrap_or_else(PoisonError::into_inner);
+                if names.len() >= MAX_PROCESSES {
+                    names.pop_first();
+                }
                 names.insert(participant(&process.gid()), nodes.join(" "));
             }
         });
