@@ -51,6 +51,7 @@
 //! | approach | motion of the reference to a setpoint or target that is away from it |
 //! | assembly mode | one of the up to 40 poses that share the same six leg lengths |
 //! | axial, transverse | along a leg; normal to it |
+//! | bridge | process that connects a machine with a network: for the daemon a setpoint source, an operator and a reader |
 //! | brakes | hold the legs while forces are disabled |
 //! | clear | operator request that ends a fault, after inspection |
 //! | computed torque | control law: inverse dynamics of the desired acceleration plus feedback on the tracking error |

@@ -51,7 +51,7 @@ impl HoldArguments {
             stop.wait(STATUS_INTERVAL);
         }
         // The wait for this stop must not end by the signal that has caused it.
-        let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT };
+        let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT, remote: None };
         let outcome = stop_machine(&machine, &order, &|| false);
         if !has_control {
             // Without control there is nothing to stop, unless control was taken just now.

@@ -77,7 +77,7 @@ impl RequestArguments {
 
     fn send(&self, request: Request, is_patient: bool) -> Result<(), Failure> {
         let (machine, stop) = (machine_name(self.machine.path())?, Stop::on_signals()?);
-        let order = Order { request, is_patient, timeout: self.wait.limit() };
+        let order = Order { request, is_patient, timeout: self.wait.limit(), remote: None };
         let waits = |reason: &str| eprintln!("hexad: waiting: {reason}");
         let state = carry_out(&machine, &order, &|| stop.is_requested(), waits)?;
         Ok(print(format_args!("{state}\n"))?)
@@ -101,7 +101,7 @@ impl StopArguments {
             None if self.all || request == Request::Estop => Target::All,
             None => Target::Only,
         };
-        let order = Order { request, is_patient: false, timeout: self.wait.limit() };
+        let order = Order { request, is_patient: false, timeout: self.wait.limit(), remote: None };
         let stopped = stop(target, &order, &|| interrupted.is_requested())?;
         report(stopped, matches!(target, Target::All))
     }
@@ -142,7 +142,7 @@ pub fn machine_name(argument: &Path) -> Result<String, ConfigError> {
 /// Sends a request in a separate thread, so that setpoints do not wait. Logs what the request waits for.
 pub fn carry_out_in_background(
     machine: &str,
-    order: Order,
+    order: Order<'static>,
     stop: &Stop,
 ) -> Receiver<Result<(), OperatorError>> {
     let (send, result) = channel();

@@ -63,6 +63,7 @@ mod rejection;
 mod remains;
 mod reservation;
 mod setpoint;
+pub mod source_clock;
 mod statistics;
 mod status;
 mod subscriber;

@@ -10,7 +10,7 @@ use super::{OperatorError, Order};
 /// Time after the timeout of the request within which the daemon must answer.
 const ANSWER_GRACE: Duration = Duration::from_secs(2);
 
-impl Order {
+impl Order<'_> {
     /// Request line of the order.
     pub(super) fn line(&self) -> RequestLine {
         RequestLine {
@@ -18,6 +18,7 @@ impl Order {
             until_ready: self.is_patient,
             progress: true,
             within_s: self.timeout.as_secs_f64(),
+            remote: self.remote.map(Into::into),
             ..RequestLine::new(self.request.name())
         }
     }

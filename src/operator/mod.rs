@@ -127,11 +127,13 @@ impl Stranger {
 
 /// A request with its options.
 #[derive(Clone, Copy, Debug)]
-pub struct Order {
+pub struct Order<'a> {
     /// The request.
     pub request: Request,
     /// Whether to wait for missing measurements and setpoints instead of being refused.
     pub is_patient: bool,
     /// Longest wait for the result.
     pub timeout: Duration,
+    /// Remote side for which a bridge sends the request, for the log of the daemon.
+    pub remote: Option<&'a str>,
 }

@@ -40,6 +40,9 @@ pub struct RequestLine {
     /// Length of a recording \[s\]; `None` for all cycles that are kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,
+    /// Remote side for which a bridge sends the request: its own words, which nobody has verified.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remote: Option<String>,
     /// Whether a motion takes control, if the platform is not under control. `within_s` bounds the wait for it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub engage: bool,

@@ -11,9 +11,13 @@ static FOUND: Mutex<BTreeMap<String, Result<PathBuf, String>>> = Mutex::new(BTre
 
 /// The virtual environment with these packages, set up by whoever comes first, or why there is none.
 pub fn environment(packages: &[String]) -> Result<PathBuf, String> {
-    let name = packages.join("-").replace("==", "-");
+    named_environment(&packages.join("-").replace("==", "-"), packages)
+}
+
+/// The same with the name of the environment, and arguments for pip.
+pub fn named_environment(name: &str, arguments: &[String]) -> Result<PathBuf, String> {
     let mut found = FOUND.lock().unwrap();
-    found.entry(name.clone()).or_insert_with(|| locked_environment(&name, packages)).clone()
+    found.entry(name.into()).or_insert_with(|| locked_environment(name, arguments)).clone()
 }
 
 fn locked_environment(name: &str, packages: &[String]) -> Result<PathBuf, String> {

@@ -25,7 +25,8 @@ pub fn send(machine: &str, request: u32, until_ready: bool, within_s: f64) -> Ou
         let text = format!("within_s = {within_s} s is not between 0 and {MAX_WITHIN_S} s");
         return Err(Failure::new(HEXAD_INVALID, text));
     }
-    let order = Order { request, is_patient: until_ready, timeout: Duration::from_secs_f64(within_s) };
+    let order =
+        Order { request, is_patient: until_ready, timeout: Duration::from_secs_f64(within_s), remote: None };
     let never = || false;
     let outcome = match is_stop(request) {
         true => stop_machine(machine, &order, &never),

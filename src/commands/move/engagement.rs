@@ -75,7 +75,8 @@ impl Engagement {
             Self::Socket { config, began, within, stop, result } => {
                 let result = result.get_or_insert_with(|| {
                     let rest = within.saturating_sub(began.elapsed());
-                    let order = Order { request: Request::Engage, is_patient: true, timeout: rest };
+                    let order =
+                        Order { request: Request::Engage, is_patient: true, timeout: rest, remote: None };
                     carry_out_in_background(&config.name, order, stop)
                 });
                 match result.try_recv() {

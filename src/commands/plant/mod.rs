@@ -281,7 +281,7 @@ fn log_brakes(before: Brakes, now: Brakes, code: DiagnosticCode) {
 
 /// Prepares the thread as well as permitted: a simulator or a setpoint source below the daemon's priority, so
 /// that on a busy host it is as punctual as hardware.
-pub(super) fn prepare_thread(config: &Config) {
+pub fn prepare_thread(config: &Config) {
     scheduling::set_shortest_timer_slack();
     if let Err(shortfall) = scheduling::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
         debug!("{shortfall}");

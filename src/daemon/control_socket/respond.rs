@@ -58,7 +58,8 @@ impl Server<'_> {
         // Before the log, which may block.
         let answer = self.begin(connection, request, line, snapshot);
         let is_read = self.supersede_motion(connection, snapshot);
-        info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
+        let (user, process) = (connection.peer.user(), connection.peer.process_id);
+        info!(%user, process, remote = line.remote.as_deref(), "request: {}", request.name());
         is_read
             && answer.is_none_or(|answer| {
                 connection.peer.log_failure(&answer);

@@ -15,7 +15,7 @@ use clap::Args;
 use tracing::{info, warn};
 
 use self::datagram_format::{Datagram, DatagramFormat, FormatError};
-use self::source_clock::SourceClock;
+use self::restarting_clock::RestartingClock;
 use self::status_feed::StatusFeed;
 use super::PlaybackOptions;
 use crate::analysis::target_motion::check_target;
@@ -34,7 +34,7 @@ use crate::operator::requests::status;
 use crate::realtime::stop_request::Stop;
 
 mod datagram_format;
-mod source_clock;
+mod restarting_clock;
 mod status_feed;
 
 /// Longest time without datagrams before the platform comes to rest \[s\], if `timeouts.setpoint_ms` does not bound it.
@@ -217,7 +217,7 @@ struct Receiver {
     format: DatagramFormat,
     from: Vec<IpAddr>,
     home: [f64; 6],
-    clock: SourceClock,
+    clock: RestartingClock,
     max_age_ns: i64,
     pause_s: f64,
     /// Arrival of the last datagram \[ns\].
@@ -247,7 +247,7 @@ impl Receiver {
             format,
             from: options.from.clone(),
             home: config.machine.home,
-            clock: SourceClock::default(),
+            clock: RestartingClock::default(),
             max_age_ns: (timeout_s * 1e9) as i64,
             pause_s: PAUSE_S.min(PAUSE_SHARE * timeout_s),
             last_ns: 0,

@@ -73,7 +73,7 @@ impl Feed for StatusFeed {
     fn request_control(&mut self) -> Result<(), TargetError> {
         let Some(timeout) = self.within else { return Ok(()) };
         let engagement = self.engagement.get_or_insert_with(|| {
-            let order = Order { request: Request::Engage, is_patient: true, timeout };
+            let order = Order { request: Request::Engage, is_patient: true, timeout, remote: None };
             carry_out_in_background(&self.machine, order, &self.stop)
         });
         let Ok(outcome) = engagement.try_recv() else { return Ok(()) };

@@ -1,0 +1,167 @@
+//! The bridge of one machine: setpoints from ROS 2 to the daemon, measured motion from the daemon to ROS 2.
+
+use std::thread::sleep;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use hexad::commands::plant::prepare_thread;
+use hexad::config::Config;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::{MeasuredMessage, StatusMessage, Subscriber};
+use hexad::realtime::stop_request::Stop;
+use ros2_client::{Gid, Publisher, Subscription};
+use tracing::info;
+
+use crate::network_file::{NetworkFile, SetpointTopic};
+use crate::node::{BUFFER, BridgeNode, NodeNames};
+use crate::rejection::{Rejection, RejectionLog};
+use crate::requests::serve;
+use crate::ros_messages as ros;
+use crate::setpoint_relay::SetpointRelay;
+use crate::telemetry::{PlatformMotion, Telemetry};
+
+/// Period of the loop.
+const PERIOD: Duration = Duration::from_millis(1);
+
+/// Bridge of one machine.
+pub struct Bridge<'a> {
+    relay: SetpointRelay<'a>,
+    telemetry: Telemetry<'a>,
+    poses: Option<Subscription<ros::PoseStamped>>,
+    trajectories: Option<Subscription<ros::MultiDofTrajectory>>,
+    output: Output,
+    rejections: RejectionLog,
+    node: BridgeNode,
+}
+
+/// From the topics of the machine to those of ROS 2.
+struct Output {
+    measured: Subscriber<MeasuredMessage>,
+    statuses: Subscriber<StatusMessage>,
+    joint_states: Publisher<ros::JointState>,
+    transforms: Publisher<ros::TfMessage>,
+    poses: Publisher<ros::PoseStamped>,
+    twists: Publisher<ros::TwistStamped>,
+    accels: Publisher<ros::AccelStamped>,
+    before: Option<PlatformMotion>,
+    period_ns: u64,
+    due_ns: u64,
+}
+
+impl<'a> Bridge<'a> {
+    /// Joins the machine and ROS 2. An error says what prevents it.
+    pub fn open(file: &NetworkFile, config: &'a Config) -> Result<Self, String> {
+        let section = &file.ros2;
+        if file.name != config.name {
+            return Err(format!(
+                "name = \"{}\" is not that of the machine file, \"{}\"",
+                file.name, config.name
+            ));
+        }
+        let bus = config.join().map_err(|error| error.to_string())?;
+        if bus.is_simulated() {
+            return Err(
+                "the machine runs in simulated time, which no other host shares: realtime.release".into()
+            );
+        }
+        let mut node = BridgeNode::join(section, section.addresses()?)?;
+        let accepts = |topic| section.setpoints.contains(&topic);
+        let poses = accepts(SetpointTopic::Pose).then(|| node.subscription("setpoint_pose"));
+        let trajectories =
+            accepts(SetpointTopic::Trajectory).then(|| node.subscription("setpoint_trajectory"));
+        let [base, platform] = ["base", "platform"].map(|frame| format!("{}{frame}", section.frame_prefix));
+        let output = Output {
+            measured: bus.subscriber(BUFFER).map_err(|error| error.to_string())?,
+            statuses: bus.subscriber(BUFFER).map_err(|error| error.to_string())?,
+            joint_states: node.publisher("joint_states")?,
+            transforms: node.publisher("/tf")?,
+            poses: node.publisher("pose")?,
+            twists: node.publisher("twist")?,
+            accels: node.publisher("acceleration")?,
+            before: None,
+            period_ns: (1e9 / section.rate_hz) as u64,
+            due_ns: 0,
+        };
+        for request in section.allowed_requests()? {
+            serve(config.name.clone(), request, node.trigger(request.name())?, node.names.clone());
+        }
+        Ok(Self {
+            relay: SetpointRelay::new(config, base.clone()),
+            telemetry: Telemetry { config, base, platform, clock_offset_ns: 0 },
+            poses: poses.transpose()?,
+            trajectories: trajectories.transpose()?,
+            output,
+            rejections: RejectionLog::default(),
+            node,
+        })
+    }
+
+    /// Relays until a signal.
+    pub fn run(&mut self, stop: &Stop) {
+        prepare_thread(self.telemetry.config);
+        info!("the bridge is open");
+        while !stop.is_requested() {
+            sleep(PERIOD);
+            self.receive();
+            let now_ns = monotonic_ns();
+            if let Err(error) = self.relay.publish(now_ns) {
+                self.rejections
+                    .add(&Rejection::Port(error.to_string()), || self.telemetry.config.name.clone());
+            }
+            if now_ns >= self.output.due_ns {
+                let unix_ns = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+                self.telemetry.clock_offset_ns = unix_ns as i64 - now_ns as i64;
+                self.output.publish(&self.telemetry, now_ns);
+            }
+        }
+    }
+
+    fn receive(&mut self) {
+        let Self { relay, poses, trajectories, rejections, node, .. } = self;
+        let names = &node.names;
+        drain(poses, rejections, names, |message, id, arrival_ns| relay.add_pose(message, id, arrival_ns));
+        drain(trajectories, rejections, names, |message, id, arrival_ns| {
+            relay.add_trajectory(message, id, arrival_ns)
+        });
+    }
+}
+
+/// Adds the messages that have arrived, and logs the rejected ones.
+fn drain<M: ros::RosMessage + 'static>(
+    subscription: &Option<Subscription<M>>,
+    rejections: &mut RejectionLog,
+    names: &NodeNames,
+    mut add: impl FnMut(&M, Gid, u64) -> Result<(), Rejection>,
+) {
+    let Some(subscription) = subscription else { return };
+    for _ in 0..BUFFER {
+        let (outcome, id) = match subscription.take() {
+            Ok(Some((message, info))) => {
+                let id = info.publisher_gid();
+                (add(&message, id, monotonic_ns()), id)
+            }
+            Ok(None) => return,
+            Err(error) => (Err(Rejection::Format(error.to_string())), Gid::ZERO),
+        };
+        if let Err(rejection) = outcome {
+            rejections.add(&rejection, || names.of(&id));
+        }
+    }
+}
+
+impl Output {
+    fn publish(&mut self, telemetry: &Telemetry, now_ns: u64) {
+        self.due_ns = (self.due_ns + self.period_ns).max(now_ns);
+        let motion = self.statuses.receive_latest().as_ref().and_then(PlatformMotion::of_status);
+        if let Some(measured) = self.measured.receive_latest() {
+            let _ = self.joint_states.publish(telemetry.joint_state(&measured, motion.as_ref()));
+        }
+        let before = std::mem::replace(&mut self.before, motion);
+        let Some(motion) = &motion else { return };
+        let _ = self.transforms.publish(telemetry.transform(motion));
+        let _ = self.poses.publish(telemetry.pose(motion));
+        let _ = self.twists.publish(telemetry.twist(motion));
+        if let Some(acceleration) = before.and_then(|before| motion.acceleration_since(&before)) {
+            let _ = self.accels.publish(telemetry.accel(motion, &acceleration));
+        }
+    }
+}

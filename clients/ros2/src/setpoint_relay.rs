@@ -1,0 +1,237 @@
+//! Setpoints of remote sources on the topic of the machine. Each life of a source is a life of a publisher: the daemon decides
+//! whether it counts, and how the platform reacts to its end.
+
+use std::collections::BTreeMap;
+
+use hexad::config::Config;
+use hexad::control::parameters::ViolationPolicy;
+use hexad::control::signals::inputs::{Setpoint, SetpointKind};
+use hexad::messages::source_clock::SourceClock;
+use hexad::messages::{Bus, PortError, Publisher, SetpointMessage};
+use hexad::model::task::TaskState;
+use ros2_client::Gid;
+use tracing::info;
+
+use crate::conversion::{pose_x, trajectory_point};
+use crate::rejection::Rejection;
+use crate::ros_messages as ros;
+
+/// Number of sources whose clocks are kept. The one that was silent for longest is forgotten.
+const MAX_SOURCES: usize = 16;
+
+/// Most messages of a source in a second: twice those of a loop at 1 kHz.
+const MAX_RATE_HZ: u64 = 2_000;
+
+/// Messages that may arrive at once, after an interruption.
+const BURST: u64 = 64;
+
+/// Relay of one machine.
+pub struct SetpointRelay<'a> {
+    config: &'a Config,
+    /// Name of the frame of all setpoints.
+    frame: String,
+    /// Silence after which a source has ended, and largest age of a message \[ns\].
+    timeout_ns: u64,
+    sources: BTreeMap<Gid, Source>,
+    /// Source that is followed.
+    followed: Option<Gid>,
+    /// Newest setpoint that is not published yet.
+    newest: Option<Setpoint>,
+    /// Publisher of the life of the followed source.
+    publisher: Option<(Publisher<SetpointMessage>, Bus)>,
+}
+
+/// A publisher of ROS 2.
+struct Source {
+    clock: SourceClock,
+    /// Arrival of its last accepted message \[ns\].
+    seen_ns: u64,
+    /// Instant from which on the next message is within [`MAX_RATE_HZ`] \[ns\].
+    due_ns: u64,
+}
+
+impl<'a> SetpointRelay<'a> {
+    /// Relay without a source. `frame` is the name of the frame of all setpoints.
+    pub fn new(config: &'a Config, frame: String) -> Self {
+        let timeout_ns = (config.deployment.timeouts.setpoint_s * 1e9) as u64;
+        Self {
+            config,
+            frame,
+            timeout_ns,
+            sources: BTreeMap::new(),
+            followed: None,
+            newest: None,
+            publisher: None,
+        }
+    }
+
+    /// Accepts a pose as a sample of a motion.
+    pub fn add_pose(
+        &mut self,
+        message: &ros::PoseStamped,
+        id: Gid,
+        arrival_ns: u64,
+    ) -> Result<(), Rejection> {
+        let config = self.config;
+        self.add(&message.header, id, arrival_ns, || {
+            if config.deployment.setpoint.on_violation != ViolationPolicy::Limit {
+                return Err(Rejection::Policy);
+            }
+            let x = pose_x(&message.pose, &config.machine.home)?;
+            Ok((SetpointKind::Pose, TaskState::at_rest(x), 0))
+        })
+    }
+
+    /// Accepts the point of a trajectory.
+    pub fn add_trajectory(
+        &mut self,
+        message: &ros::MultiDofTrajectory,
+        id: Gid,
+        arrival_ns: u64,
+    ) -> Result<(), Rejection> {
+        let (home, timeout_ns) = (&self.config.machine.home, self.timeout_ns);
+        self.add(&message.header, id, arrival_ns, || {
+            let (task, ahead_ns) = trajectory_point(message, home)?;
+            if !(0..=timeout_ns as i64).contains(&ahead_ns) {
+                return Err(Rejection::Ahead(ahead_ns as f64 * 1e-9, timeout_ns as f64 * 1e-6));
+            }
+            Ok((SetpointKind::Motion, task, ahead_ns))
+        })
+    }
+
+    /// Accepts a message with a header, which holds this long after its stamp \[ns\].
+    fn add(
+        &mut self,
+        header: &ros::Header,
+        id: Gid,
+        arrival_ns: u64,
+        convert: impl FnOnce() -> Result<(SetpointKind, TaskState, i64), Rejection>,
+    ) -> Result<(), Rejection> {
+        self.end_silent(arrival_ns);
+        if let Some(followed) = self.followed.filter(|followed| *followed != id) {
+            return Err(Rejection::OtherSource(format!("{followed:?}")));
+        }
+        let timeout_ns = self.timeout_ns;
+        let is_in_frame = header.frame_id == self.frame;
+        let source = self.source(id, arrival_ns);
+        let (due_ns, interval_ns) = (source.due_ns.max(arrival_ns), 1_000_000_000 / MAX_RATE_HZ);
+        if due_ns - arrival_ns >= BURST * interval_ns {
+            return Err(Rejection::Flood(MAX_RATE_HZ));
+        }
+        source.due_ns = due_ns + interval_ns;
+        if !is_in_frame {
+            return Err(Rejection::Frame(header.frame_id.chars().take(64).collect(), self.frame.clone()));
+        }
+        let (kind, task, ahead_ns) = convert()?;
+        let instant_ns =
+            source.clock.instant_ns(header.stamp.nanoseconds(), arrival_ns as i64, timeout_ns as i64);
+        let instant_ns = instant_ns.ok_or(Rejection::Late(timeout_ns as f64 * 1e-6))?;
+        source.seen_ns = arrival_ns;
+        let time_ns = instant_ns.saturating_add(ahead_ns) as u64;
+        self.newest = Some(Setpoint { kind, ..Setpoint::motion(time_ns, task) });
+        if self.followed.replace(id).is_none() {
+            info!("follows the source {id:?}");
+        }
+        Ok(())
+    }
+
+    /// Publishes the newest setpoint since the last call, if there is one.
+    pub fn publish(&mut self, now_ns: u64) -> Result<(), PortError> {
+        self.end_silent(now_ns);
+        let Some(setpoint) = self.newest.take() else { return Ok(()) };
+        let (publisher, _) = match &mut self.publisher {
+            Some(publisher) => publisher,
+            none => {
+                let bus = self.config.join()?;
+                none.insert((bus.publisher()?, bus))
+            }
+        };
+        publisher.publish(setpoint.time_ns, (&setpoint).into())
+    }
+
+    /// Ends the life of the publisher if its source is silent.
+    fn end_silent(&mut self, now_ns: u64) {
+        let Some(followed) = self.followed else { return };
+        let source = self.sources.get(&followed);
+        if source.is_none_or(|source| now_ns.saturating_sub(source.seen_ns) > self.timeout_ns) {
+            info!("the source {followed:?} has ended");
+            (self.followed, self.newest, self.publisher) = (None, None, None);
+        }
+    }
+
+    /// The source with this identity.
+    fn source(&mut self, id: Gid, now_ns: u64) -> &mut Source {
+        if self.sources.len() >= MAX_SOURCES && !self.sources.contains_key(&id) {
+            let silent = self.sources.iter().min_by_key(|(_, source)| source.seen_ns);
+            silent.map(|(id, _)| *id).and_then(|id| self.sources.remove(&id));
+        }
+        let new = || Source { clock: SourceClock::default(), seen_ns: now_ns, due_ns: 0 };
+        self.sources.entry(id).or_insert_with(new)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+    const SOURCE: [u8; 16] = [7; 16];
+
+    fn config() -> Config {
+        let text = include_str!("../../../config/motion_base.toml");
+        let sections = "\n[setpoint]\non_violation = \"limit\"\n[timeouts]\nsetpoint_ms = 100\n";
+        Config::parse(&format!("{text}{sections}"), "a test").unwrap()
+    }
+
+    /// Pose at home with a stamp of the source's clock \[ns\].
+    fn pose(stamp_ns: u64) -> ros::PoseStamped {
+        let stamp = ros::Time::from_nanoseconds(stamp_ns as i64);
+        let header = ros::Header { stamp, frame_id: "base".into() };
+        let mut message = ros::PoseStamped { header, ..Default::default() };
+        (message.pose.position.z, message.pose.orientation.w) = (1.25, 1.0);
+        message
+    }
+
+    /// Rejections of messages, each with its source, stamp and arrival \[ms\].
+    fn rejections(messages: &[(u8, u64, u64)]) -> Vec<Option<Rejection>> {
+        let config = config();
+        let mut relay = SetpointRelay::new(&config, "base".into());
+        let add = |(id, stamp_ms, arrival_ms): &(u8, u64, u64)| {
+            relay.add_pose(&pose(stamp_ms * MS), [*id; 16].into(), arrival_ms * MS).err()
+        };
+        messages.iter().map(add).collect()
+    }
+
+    #[test]
+    fn a_message_later_than_the_stream_is_never_followed_whenever_it_arrives() {
+        // Held up for 5 s, for longer than any source is silent.
+        let messages =
+            [(1, 1000, 9000), (1, 1010, 9010), (1, 1020, 14_020), (1, 1030, 17_000), (1, 9_100, 17_100)];
+        let found = rejections(&messages);
+        let late = Some(Rejection::Late(100.0));
+        assert_eq!(found, [None, None, late.clone(), late, None]);
+    }
+
+    #[test]
+    fn one_source_is_followed_until_it_is_silent() {
+        let found = rejections(&[(1, 10, 9000), (2, 10, 9050), (1, 60, 9060), (2, 20, 9200), (1, 200, 9210)]);
+        let is_other = |found: &Option<Rejection>| matches!(found, Some(Rejection::OtherSource(_)));
+        assert_eq!(found.iter().map(is_other).collect::<Vec<_>>(), [false, true, false, false, true]);
+    }
+
+    #[test]
+    fn a_flood_and_another_frame_are_named() {
+        let config = config();
+        let mut relay = SetpointRelay::new(&config, "base".into());
+        let mut add = |message: &ros::PoseStamped, k| relay.add_pose(message, SOURCE.into(), 9000 * MS + k);
+        // 10,000 messages a second, for one second.
+        let found: Vec<_> = (0..10_000).map(|k| add(&pose(1000 * MS + k * MS / 10), k * MS / 10)).collect();
+        let accepted = found.iter().filter(|found| found.is_ok()).count() as u64;
+        assert!((MAX_RATE_HZ..MAX_RATE_HZ + BURST + 1).contains(&accepted), "{accepted}");
+        assert!(found.iter().rev().take(10).any(Result::is_ok), "none is silent");
+        assert!(found.contains(&Err(Rejection::Flood(MAX_RATE_HZ))));
+        let mut message = pose(2000 * MS);
+        message.header.frame_id = "map".into();
+        assert_eq!(add(&message, 2000 * MS), Err(Rejection::Frame("map".into(), "base".into())));
+    }
+}
