@@ -90,7 +90,7 @@ impl Coordinates {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(crate) mod tests {
     use super::*;
 
     const MACHINE: &str = include_str!("../../config/fried2008.toml");
