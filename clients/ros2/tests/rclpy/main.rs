@@ -130,7 +130,7 @@ fn rclpy_reads_the_state_and_moves_the_platform_with_poses() {
     cell.hosts.wait_for("stranger", "end of stranger");
     // The daemon names the remote side.
     let log = cell.hosts.log("daemon");
-    let request = log.lines().find(|line| line.contains("request: engage")).unwrap();
+    let request = log.lines().find(|line| line.contains("request: stop")).unwrap();
     assert!(request.contains("remote=\"/panel ("), "{request}");
 }
 

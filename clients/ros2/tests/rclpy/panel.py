@@ -137,9 +137,9 @@ def check_state():
     assert newest["/pose"].header.frame_id == "base" and abs(newest["/pose"].pose.position.z - HOME_Z) < 1e-3
     age = time.time() - joints.header.stamp.sec - joints.header.stamp.nanosec * 1e-9
     assert 0.0 < age < 5.0, age
-    topics = dict(node.get_topic_names_and_types())
-    assert topics["/tf"] == ["tf2_msgs/msg/TFMessage"], topics
-    assert "hexad_ros2" in node.get_node_names()
+    # Nodes and topics become known one by one.
+    wait("the topic /tf", lambda: ("/tf", ["tf2_msgs/msg/TFMessage"]) in node.get_topic_names_and_types())
+    wait("the name of the node", lambda: "hexad_ros2" in node.get_node_names())
 
 
 def poses():
