@@ -11,7 +11,7 @@
 //!
 //! A motion whose blocks are nearly singular is evaluated alone, by LU.
 //!
-//! Measured (2026-11-27, AMD EPYC, AVX2, exact model): 0.6 to 0.8 of the time with legs in lanes, 690 instead of 980 instructions.
+//! Measured (2026-11-27, AMD EPYC, AVX2, exact model): 0.71 to 0.78 of the time with legs in lanes, 690 instead of 980 instructions.
 //! Vectors of four motions, which fill one register of AVX2, took as long: fewer values leave the registers, but the
 //! divisions of one half no longer hide behind the other.
 
