@@ -55,13 +55,11 @@ fn is_unit(rest: &str) -> bool {
         && !["_rate", "_accel"].iter().any(|part| rest.starts_with(part))
 }
 
-/// What a header has in place of a column that is missing: one with another unit. Empty if there is none.
-pub(super) fn hint(header: &[String], name: &str) -> String {
+/// What a header has in place of a column that is missing: one with another unit.
+pub(super) fn hint(header: &[String], name: &str) -> Option<String> {
     let is_like = |found: &&String| found.strip_prefix(name).is_some_and(is_unit);
-    match (header.iter().find(is_like), unit_names(name)) {
-        (Some(found), units) if !units.is_empty() => format!(" ({}: its units are {units})", excerpt(found)),
-        _ => String::new(),
-    }
+    let (found, units) = (header.iter().find(is_like)?, unit_names(name));
+    (!units.is_empty()).then(|| format!(" ({}: its units are {units})", excerpt(found)))
 }
 
 /// Units of a column, for people.
@@ -195,7 +193,7 @@ mod tests {
         ] {
             assert_eq!(factor(name), expected, "{name}");
         }
-        assert_eq!(hint(&header, "z"), " (z_cm: its units are m, mm, um, nm)");
-        assert_eq!(hint(&header, "gamma"), "");
+        assert_eq!(hint(&header, "z").as_deref(), Some(" (z_cm: its units are m, mm, um, nm)"));
+        assert_eq!(hint(&header, "gamma"), None);
     }
 }

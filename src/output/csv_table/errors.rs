@@ -135,7 +135,13 @@ impl TableErrors {
         let (mut columns, optional_found) = (found(required), found(optional));
         let missing = |names: &[String]| -> Vec<String> {
             let absent = names.iter().filter(|name| find(header, name).is_empty());
-            absent.map(|name| format!("{name}{}", hint(header, name))).collect()
+            let mut absent: Vec<_> = absent.cloned().collect();
+            // One is enough: the nearest right header shows the others.
+            let hinted = absent.iter_mut().find_map(|name| Some((hint(header, name)?, name)));
+            if let Some((hint, name)) = hinted {
+                name.push_str(&hint);
+            }
+            absent
         };
         let absent = missing(required);
         if !absent.is_empty() {
