@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Panel on a terminal. It needs no rights but those of the group that may send requests.
+"""Panel on a terminal. Its user must be in the group that may send requests.
 
     panel.py /run/hexad/NAME.sock
 

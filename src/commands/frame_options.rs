@@ -34,7 +34,7 @@ impl FrameOptions {
         Ok(Coordinates::new(config, (!self.is_empty()).then_some(frames), names, RotationOrder::Xyz))
     }
 
-    /// Fields of a request for a motion: the frames of this file, which may be newer than that of the daemon.
+    /// Fields of a request for a motion: the frames of this file. The daemon may have read an older one.
     pub fn fields(&self, config: &Config) -> Result<[Option<FrameField>; 2], UnknownFrames> {
         let frames = config.frames_named(self.tool.as_deref(), self.work.as_deref())?;
         let field = |name: &Option<String>, pose: &Pose| {

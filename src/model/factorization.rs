@@ -261,7 +261,7 @@ pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) 
     n
 }
 
-/// Whether both determinants are large enough for block elimination; `radius_cubed` is that of [`Joints`].
+/// Whether both determinants are large enough for block elimination; `radius_cubed` is a field of [`Joints`].
 #[inline(always)]
 pub(super) fn are_regular_blocks(d_a: f64, d_s: f64, radius_cubed: f64) -> bool {
     d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * radius_cubed

@@ -1,7 +1,7 @@
 //! Inverse dynamics of many motions: eight at once, one per lane, leg after leg.
 //!
-//! The formulas are those of one motion, by the same code: [`super::inverse_geometry`] and [`super::leg`] do not know whether a
-//! lane is a leg or a motion. Here no lane is padding and none waits for another. The platform and the factorization of N, which
+//! The legs are evaluated by the same code as in one motion: [`super::inverse_geometry`] and [`super::leg`] do not know whether
+//! a lane is a leg or a motion. Here no lane is padding and none waits for another. The platform and the factorization of N, which
 //! exchange values between the lanes of one motion, are written out:
 //!
 //! ```text
@@ -75,7 +75,7 @@ impl InverseDynamics {
     /// Actuator forces Gamma \[N\] of each motion, to the same place in `forces`; `None` at singular poses. Elements
     /// beyond the shorter slice are left as they are.
     ///
-    /// They differ from those of [`InverseDynamics::forces_of`] by rounding.
+    /// [`InverseDynamics::forces_of`] differs by rounding.
     pub fn forces_of_all(&self, fidelity: Fidelity, motions: &[Motion], forces: &mut [Option<[f64; LEGS]>]) {
         with_terms!(fidelity, M => self.write_forces::<M>(motions, forces));
     }

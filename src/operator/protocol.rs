@@ -58,10 +58,10 @@ pub struct RequestLine {
     /// Coordinates of `goto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetFields>,
-    /// Whether the coordinates are added to those of the target that is held, else of the platform.
+    /// Whether the coordinates are added to the target that is held, or to the pose of the platform if none is.
     #[serde(default, skip_serializing_if = "is_false")]
     pub relative: bool,
-    /// Whether the coordinates that are not given are those of home.
+    /// Whether the missing coordinates are taken from the home pose.
     #[serde(default, skip_serializing_if = "is_false")]
     pub home: bool,
     /// Share of the limits of autonomous motions; `None` for 1.

@@ -33,7 +33,7 @@ pub struct Bridge<'a> {
     node: BridgeNode,
 }
 
-/// From the topics of the machine to those of ROS 2.
+/// Publishers of the machine's motion in ROS 2.
 struct Output {
     measured: Subscriber<MeasuredMessage>,
     statuses: Subscriber<StatusMessage>,
@@ -53,7 +53,7 @@ impl<'a> Bridge<'a> {
         let section = &file.ros2;
         if file.name != config.name {
             return Err(format!(
-                "name = \"{}\" is not that of the machine file, \"{}\"",
+                "name = \"{}\" must be the name in the machine file, \"{}\"",
                 file.name, config.name
             ));
         }

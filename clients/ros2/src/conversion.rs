@@ -7,10 +7,10 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use crate::rejection::Rejection;
 use crate::ros_messages as ros;
 
-/// Largest difference of a quaternion's norm from 1: that of numbers in single precision, many times.
+/// Largest difference of a quaternion's norm from 1: many times the rounding of numbers in single precision.
 const MAX_NORM_ERROR: f64 = 1e-3;
 
-/// X of a pose, its angles nearest to those of `near`.
+/// X of a pose, with the angles nearest to the angles of `near`.
 pub fn pose_x(message: &ros::Pose, near: &[f64; 6]) -> Result<[f64; 6], Rejection> {
     let ros::Point { x, y, z } = message.position;
     Ok(task_coordinates(&pose(Vector3::new(x, y, z), &message.orientation)?, near))

@@ -68,7 +68,7 @@ fn stops() -> Vec<String> {
     [Request::Stop, Request::Off, Request::Estop].map(|request| request.name().into()).into()
 }
 
-/// Largest DDS domain whose ports are below those that Linux gives to other connections.
+/// Largest DDS domain with all ports below the range that Linux gives to other connections.
 const MAX_DOMAIN_ID: u16 = 101;
 
 /// Largest rate of messages \[Hz\].

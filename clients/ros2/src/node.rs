@@ -23,7 +23,7 @@ const PARTICIPANT_BYTES: usize = 12;
 /// Largest number of processes whose nodes are known by name.
 const MAX_PROCESSES: usize = 256;
 
-/// Messages that are kept until they are read: those of one pass of the loop.
+/// Messages that are kept until they are read: as many as arrive in one pass of the loop.
 pub const BUFFER: usize = 64;
 
 /// Node of one machine. Its topics and services end with it.

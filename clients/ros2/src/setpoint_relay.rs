@@ -19,7 +19,7 @@ use crate::ros_messages as ros;
 /// Number of sources whose clocks are kept. The one that was silent for longest is forgotten.
 const MAX_SOURCES: usize = 16;
 
-/// Most messages of a source in a second: twice those of a loop at 1 kHz.
+/// Most messages of a source in a second: twice the rate of a loop at 1 kHz.
 const MAX_RATE_HZ: u64 = 2_000;
 
 /// Messages that may arrive at once, after an interruption.

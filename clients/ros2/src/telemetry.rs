@@ -55,7 +55,7 @@ impl Telemetry<'_> {
         ros::Header { stamp, frame_id: self.base.clone() }
     }
 
-    /// Lengths of the legs; rates and forces if they are known. The joints are those of `hexad export --format urdf`.
+    /// Lengths of the legs; rates and forces if they are known. Joints have their names of `hexad export --format urdf`.
     pub fn joint_state(
         &self,
         measured: &MeasuredMessage,

@@ -50,13 +50,13 @@ pub enum Motion {
 pub struct GotoOrder {
     /// Coordinates that are given \[rad\], \[m\].
     pub target: [Option<f64>; 6],
-    /// Whether they are added to those of the target that is held, else of the platform.
+    /// Whether they are added to the target that is held, or to the pose of the platform if none is.
     pub relative: bool,
-    /// Whether the others are those of home.
+    /// Whether the others are taken from the home pose.
     pub home: bool,
     /// Share of the limits of autonomous motions.
     pub speed: f64,
-    /// Distance at which the platform is in position \[m\], if not that of the machine file.
+    /// Distance at which the platform is in position \[m\]; `None` for the value of the machine file.
     pub tolerance_m: Option<f64>,
 }
 

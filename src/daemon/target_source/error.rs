@@ -65,7 +65,7 @@ pub enum TargetError {
     /// The platform was not in position within this time \[s\].
     #[error(
         "the reference has reached the target, but the platform was not in position within {0:.1} s: it is {1} from the target, \
-         tolerance {tolerance} (in_position.tolerance_m, tolerance_rad, or that of the request); look for friction, noise that is \
+         tolerance {tolerance} (in_position.tolerance_m, tolerance_rad, or tolerance_m of the request); look for friction, noise that is \
          not stated, and a force that holds the platform; it stands under control",
         tolerance = Deviation::of_window(.2)
     )]

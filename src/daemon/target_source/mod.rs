@@ -109,7 +109,7 @@ pub struct TargetSource<'a, F> {
     tick_ns: u64,
     /// Instant since which the state is active \[ns\].
     active_since_ns: Option<u64>,
-    /// X of the setpoint, the instant since which it is published, and that of the first one \[ns\].
+    /// X of the setpoint, the instant of its first publication, and the instant of the first setpoint \[ns\].
     published: Option<([f64; 6], u64)>,
     began_ns: u64,
     /// Share of the limits of autonomous motions.
@@ -258,7 +258,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     }
 }
 
-/// Whether X is that of the newest setpoint of the daemon.
+/// Whether the newest setpoint that the daemon has is X.
 pub fn has_received(observation: &Observation, x: &[f64; 6]) -> bool {
     let is_same = |received: [f64; 6]| received.iter().zip(x).all(|(a, b)| (a - b).abs() < SAME);
     observation.setpoint.is_some_and(is_same)

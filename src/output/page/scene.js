@@ -183,9 +183,11 @@ function drawForces(pen, project, platform, forces) {
 function describe(angles, position, isKnown) {
   const line = (names, numbers, unitName, digits) =>
     names.map((name, k) => `${name} ${fixed(numbers[k], digits)} ${unitName}`).join(", ");
-  document.getElementById("pose").textContent = isKnown
-    ? `${line(AXES, position.map((number) => 1000 * number), "mm", HEAD.machine.m_digits - 3)}\n${line(["alpha", "beta", "gamma"], angles, "°", HEAD.machine.deg_digits)}\n${intervalText(now)}`
-    : `pose unknown; drawn at home\n\n${intervalText(now)}`;
+  const { m_digits, deg_digits } = HEAD.machine;
+  const millimetres = position.map((number) => 1000 * number);
+  const pose = [line(AXES, millimetres, "mm", m_digits - 3), line(["alpha", "beta", "gamma"], angles, "°", deg_digits)];
+  const shown = isKnown ? pose : ["pose unknown; drawn at home", ""];
+  document.getElementById("pose").textContent = [...shown, intervalText(now)].join("\n");
 }
 
 // The view turns by dragging and by the arrow keys.

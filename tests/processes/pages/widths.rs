@@ -1,4 +1,4 @@
-//! Pages fit every screen, from a phone to a wide one, and their axes are those of the pictures.
+//! Pages fit every screen, from a phone to a wide one, and have the same axes as the pictures.
 
 use std::path::Path;
 

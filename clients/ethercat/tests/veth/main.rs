@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 mod failures;
+#[path = "../../../../tests/common/hexad_process.rs"]
+mod hexad_process;
 mod network;
 #[path = "../../../../tests/common/not_run.rs"]
 #[allow(dead_code, reason = "shared with the tests of hexad")]
@@ -16,30 +18,15 @@ use std::thread::sleep;
 use std::time::Duration;
 use std::{env, fs};
 
-use clap::Parser;
-use hexad::commands::CommandLine;
-use hexad::commands::log::{self, LogFormat};
 use hexad::config::Config;
 use hexad_ethercat::brake_test::holding_forces;
-use network::{HEXAD_ARGUMENTS, Network};
+use network::Network;
 use stalls::Watchdog;
 
 const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
 
 /// One loop at a time: they are real-time.
 static ALONE: Mutex<()> = Mutex::new(());
-
-/// Not a test: the command `hexad` as a process, without building it once more.
-#[test]
-#[ignore = "the other tests start it"]
-fn hexad_process() {
-    let arguments = env::var(HEXAD_ARGUMENTS).unwrap();
-    let command = CommandLine::parse_from(["hexad"].into_iter().chain(arguments.split(' ')));
-    log::install(LogFormat::Text);
-    if let Err(failure) = command.execute() {
-        panic!("{}", failure.message);
-    }
-}
 
 /// A network with the files of a machine of its own, and the simulated drives at one end of its cable.
 fn simulated(test: &str, options: &str) -> Option<Network> {

@@ -1,14 +1,12 @@
 //! A network of its own for each test: a cable between the interfaces `ec0` and `ec1`, and processes in it.
 
-use std::env;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Arguments of the command `hexad`.
-pub const HEXAD_ARGUMENTS: &str = "HEXAD_TEST_ARGUMENTS";
+use crate::hexad_process;
 
 /// Network namespace with the cable, a folder with files, and the processes that run in it.
 pub struct Network {
@@ -60,12 +58,9 @@ impl Network {
         self.command(Path::new(env!("CARGO_BIN_EXE_hexad-ethercat")), arguments)
     }
 
-    /// The command `hexad`: this program in the role of [`crate::hexad_process`].
+    /// The command `hexad`.
     pub fn hexad(&self, arguments: &str) -> Command {
-        let program = env::current_exe().unwrap();
-        let mut command = self.command(&program, "--exact hexad_process --ignored --nocapture --quiet");
-        command.env(HEXAD_ARGUMENTS, arguments);
-        command
+        hexad_process::hexad(|program, role| self.command(program, role), arguments)
     }
 
     /// Starts a process whose output is the file `name`.

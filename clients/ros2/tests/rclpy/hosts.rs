@@ -1,14 +1,12 @@
 //! Two hosts for each test: one with the machine and the bridge, one with rclpy, and a cable between them.
 
-use std::env;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Arguments of the command `hexad`.
-pub const HEXAD_ARGUMENTS: &str = "HEXAD_TEST_ARGUMENTS";
+use crate::hexad_process;
 
 /// Longest wait for what has to happen.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -89,13 +87,9 @@ impl Hosts {
         self.command(Host::Machine, Path::new(env!("CARGO_BIN_EXE_hexad-ros2")), "m-network.toml m.toml")
     }
 
-    /// The command `hexad`: this program in the role of [`crate::hexad_process`].
+    /// The command `hexad`.
     pub fn hexad(&self, arguments: &str) -> Command {
-        let program = env::current_exe().unwrap();
-        let mut command =
-            self.command(Host::Machine, &program, "--exact hexad_process --ignored --nocapture --quiet");
-        command.env(HEXAD_ARGUMENTS, arguments);
-        command
+        hexad_process::hexad(|program, role| self.command(Host::Machine, program, role), arguments)
     }
 
     /// Starts a process whose output is the file `name`.

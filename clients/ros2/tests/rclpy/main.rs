@@ -1,6 +1,8 @@
 //! The bridge with real ROS 2: rclpy over Fast DDS, from PyPI, on another host. Needs root, `ip`, PyPI once, and Python 3.11.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
+#[path = "../../../../tests/common/hexad_process.rs"]
+mod hexad_process;
 mod hosts;
 #[path = "../../../../tests/common/not_run.rs"]
 #[allow(dead_code, reason = "shared with the tests of hexad")]
@@ -15,16 +17,13 @@ mod ros_messages;
 mod stalls;
 mod type_hashes;
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::thread::sleep;
 use std::time::Duration;
-use std::{env, fs};
 
-use clap::Parser;
-use hexad::commands::CommandLine;
-use hexad::commands::log::{self, LogFormat};
-use hosts::{HEXAD_ARGUMENTS, Host, Hosts};
+use hosts::{Host, Hosts};
 use stalls::Watchdog;
 
 /// Pauses of the host up to this length are no reason to fail: measurements may be 50 ms old.
@@ -32,18 +31,6 @@ const MAX_STALL: Duration = Duration::from_millis(20);
 
 /// One loop at a time: they are real-time.
 static ALONE: Mutex<()> = Mutex::new(());
-
-/// Not a test: the command `hexad` as a process, without building it once more.
-#[test]
-#[ignore = "the other tests start it"]
-fn hexad_process() {
-    let arguments = env::var(HEXAD_ARGUMENTS).unwrap();
-    let command = CommandLine::parse_from(["hexad"].into_iter().chain(arguments.split(' ')));
-    log::install(LogFormat::Text);
-    if let Err(failure) = command.execute() {
-        panic!("{}", failure.message);
-    }
-}
 
 /// Python with rclpy, or why there is none.
 fn rclpy() -> Result<PathBuf, String> {

@@ -1,4 +1,4 @@
-"""Compares types of a file with those of ROS 2: hashes by its own generator, in its own files, and as rclpy states them."""
+"""Compares types of a file with the types of ROS 2: hashes by its own generator, in its own files, and as rclpy states them."""
 
 import glob
 import json

@@ -1,4 +1,4 @@
-//! The structs that are sent against the definitions of ROS 2: their type hashes (REP 2016) are those that rclpy states.
+//! The structs that are sent against the definitions of ROS 2: rclpy states the same type hashes (REP 2016).
 
 use std::collections::BTreeMap;
 use std::fs;

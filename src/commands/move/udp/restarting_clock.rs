@@ -1,4 +1,4 @@
-//! Clock of a source whose lives nothing tells apart.
+//! Clock of a source that restarts without notice: no datagram says that a new life has begun.
 
 use crate::messages::source_clock::SourceClock;
 

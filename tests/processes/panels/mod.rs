@@ -1,9 +1,10 @@
 //! Panels move the platform over the control socket: who may, what is refused, and what ends a motion.
 
-use std::io::Write;
-use std::process::Stdio;
+mod flood;
+mod member;
+
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hexad::control::signals::state::State;
 use hexad::messages::SetpointMessage;
@@ -12,12 +13,11 @@ use hexad::model::task::TaskState;
 use serde_json::{Value, json};
 
 use crate::support::children::{HANG, Hexad};
-use crate::support::host::{Host, MALLORY, NOGROUP, SERVICE};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::does;
 use crate::support::recorder::{Recorder, Recording};
 use crate::support::rules;
-use crate::support::socket::{Client, path_of, status};
+use crate::support::socket::{Client, status};
 use crate::support::trio::{fastest, let_pass, start_daemon, start_plant};
 use crate::support::turns;
 
@@ -304,110 +304,4 @@ fn a_stop_ends_the_wait_for_control() {
     let_pass(Duration::from_millis(500));
     assert_eq!(status(&panels.machine)["state"], "standby");
     panels.finish();
-}
-
-/// Lines without pause, valid and not, on twenty connections.
-const FLOOD: &str = r#"
-import json, random, socket, sys, threading, time
-def line(request, **more):
-    return json.dumps({"version": 1, "request": request, **more}).encode() + b"\n"
-lines = [line("jog", rate={"z_m_s": 0.01}), line("goto", home=True, wait=True), line("hold", wait=True),
-    line("goto", target={"x_m": 1e308}, relative=True), line("goto", target={"x_m": 0.001}, relative=True, tool=[0.0] * 6),
-    b'{"version": 1, "request": "jog", "rate": {"x_m_s": NaN}}\n', b'{"version": 1, "request": "goto", "wiat": 1}\n']
-def flood():
-    while True:
-        try:
-            link = socket.socket(socket.AF_UNIX)
-            link.connect(sys.argv[1])
-            link.setblocking(False)
-            for _ in range(random.randrange(1, 300)):
-                try:
-                    link.send(random.choice(lines))
-                    link.recv(1 << 16)
-                except BlockingIOError:
-                    time.sleep(0.0005)
-        except OSError:
-            time.sleep(0.001)
-for _ in range(20):
-    threading.Thread(target=flood, daemon=True).start()
-print("here", flush=True)
-time.sleep(3600)
-"#;
-
-#[test]
-fn a_flood_of_motions_disturbs_neither_the_loop_nor_a_stop() {
-    let _turn = turns::beside_others();
-    let panels = Panels::start("panel-flood");
-    panels.client().does("hold", &json!({"engage": true, "wait": true}), "done");
-    let mut flood =
-        crate::support::disturbance::python(&["/usr/bin/env"], FLOOD, &[path_of(&panels.daemon).as_os_str()]);
-    let_pass(Duration::from_secs(2));
-    assert_eq!(status(&panels.machine)["state"], "active");
-    does(&panels.machine, "stop", &[], &["standby"]);
-    let_pass(Duration::from_millis(300));
-    assert_eq!(status(&panels.machine)["state"], "standby", "none of them takes control");
-    flood.kill().expect("a signal");
-    flood.wait().expect("its end");
-    panels.finish();
-}
-
-/// The example, as a member of the group who is not the user of the daemon; beside it, the commands of that member.
-#[test]
-fn a_member_of_the_group_moves_the_platform_and_nobody_else_does() {
-    let _turn = turns::beside_others();
-    let sections = format!("{PATIENT}\n[operator]\ngroup = \"nogroup\"\n");
-    let Some(host) = Host::start(Machine::with("member", &sections)) else { return };
-    const FILE: &str = "/run/test/machine.toml";
-    let name = host.machine().name.clone();
-    host.does(&format!("mkdir -m 755 /run/hexad && chown {SERVICE}:{SERVICE} /run/hexad"));
-    let service = host.daemon(SERVICE, &[NOGROUP], None);
-    let plant = host.spawn("plant", host.hexad(SERVICE, &[], &["plant", FILE]));
-    service.says("standby: no setpoint");
-    let forbidden = host.run(MALLORY, &[], &["goto", FILE, "--home", "--engage"]);
-    let words = format!("this user may not send requests for {name}");
-    assert!(forbidden.status.code() == Some(2) && forbidden.stderr.contains(&words), "{}", forbidden.stderr);
-    let panel = |groups: &[u32]| {
-        std::fs::copy("examples/panel.py", host.machine().path("panel.py")).expect("the example");
-        let mut command = host.program(MALLORY, groups, "python3");
-        command.args(["/run/test/panel.py", &format!("/run/hexad/{name}.sock")]).stdin(Stdio::piped());
-        host.spawn("panel", command)
-    };
-    let refused = panel(&[]).ends_within(HANG);
-    assert!(refused.stderr.contains("PermissionError"), "{}", refused.stderr);
-    let moved = host.run(MALLORY, &[NOGROUP], &["goto", FILE, "--home", "--engage"]);
-    assert!(moved.status.code() == Some(0) && moved.stdout.contains("in position"), "{}", moved.stderr);
-    let mut member = panel(&[NOGROUP]);
-    let mut keys = member.input();
-    let mut says = |line: &str, words: &str| {
-        writeln!(keys, "{line}").expect("a line");
-        let began = Instant::now();
-        while !member.printed().contains(words) {
-            assert!(began.elapsed() < HANG, "{words:?} must be in {}", member.printed());
-            sleep(Duration::from_millis(5));
-        }
-    };
-    let z = || {
-        let shown = host.run(MALLORY, &[NOGROUP], &["status", &name, "--json"]);
-        let shown: Value = serde_json::from_str(&shown.stdout).expect("JSON");
-        shown["status"]["pose"][5].as_f64().expect("a pose")
-    };
-    let until = |words: &str, is_there: &dyn Fn(f64) -> bool| {
-        let began = Instant::now();
-        while !is_there(z()) {
-            assert!(began.elapsed() < HANG, "{words}: {}", z());
-        }
-    };
-    says("goto 5", "not understood");
-    says("jog z_m_s=0.02", "");
-    until("a jog", &|z| z > 0.005);
-    says("", "done active");
-    says("hold", "the platform stands under control");
-    let stands = z();
-    says("step z_m=0.01", "accepted active 0.");
-    until("a step", &|z| (z - stands - 0.01).abs() < 1e-4);
-    says("stop", "done standby");
-    drop(keys);
-    assert!(member.ends_within(HANG).status.success());
-    service.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
 }
