@@ -9,7 +9,7 @@ pub const HOLD: &str = "hold";
 /// See [`GOTO`].
 pub const JOG: &str = "jog";
 
-/// Coordinates of a target. Those that are not given stay as they are.
+/// Coordinates of a target. A missing one stays as it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TargetFields {

@@ -38,8 +38,7 @@ struct Running {
     /// Number of its connection, and the process of the client.
     connection: u64,
     process_id: i32,
-    /// Whether it ends with its connection.
-    belongs: bool,
+    ends_with_connection: bool,
     /// Whether its answer comes when it is completed, and whether lines of progress come before.
     waits: bool,
     wants_progress: bool,
@@ -82,7 +81,7 @@ impl Motions {
 impl Running {
     /// Whether the connection to which it belongs has ended.
     fn has_left(&self, connections: &[u64]) -> bool {
-        self.belongs && !connections.contains(&self.connection)
+        self.ends_with_connection && !connections.contains(&self.connection)
     }
 
     fn end(&self, end: End) {
@@ -135,7 +134,7 @@ impl Server<'_> {
             request: line.request.clone(),
             connection: connection.id,
             process_id: peer.process_id,
-            belongs: line.wait || line.request != GOTO,
+            ends_with_connection: line.wait || line.request != GOTO,
             waits: line.wait && !matches!(order.motion, Motion::Jog(_)),
             wants_progress: line.progress,
             is_answered: false,

@@ -109,8 +109,9 @@ pub struct TargetSource<'a, F> {
     tick_ns: u64,
     /// Instant since which the state is active \[ns\].
     active_since_ns: Option<u64>,
-    /// X of the setpoint, the instant of its first publication, and the instant of the first setpoint \[ns\].
+    /// X of the last setpoint, and the instant of its first publication \[ns\].
     published: Option<([f64; 6], u64)>,
+    /// Instant at which the source was opened \[ns\].
     began_ns: u64,
     /// Share of the limits of autonomous motions.
     speed: f64,
