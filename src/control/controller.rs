@@ -150,7 +150,7 @@ impl Controller {
         // Validate inputs.
         let clock = stamp_clock.check(&cycle, input.clock_offset_ns);
         let measurement = clock.and(measurements.validate(&cycle, input.measurement.as_ref()));
-        let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref(), reference);
+        let setpoint = setpoints.validate(&cycle, input, supervisor.holds_pose(), reference);
         let reported = measurement.as_ref().ok().copied();
         let reports = [drives.check(&cycle, reported), external_pose.check(&cycle, reported)];
 

@@ -43,6 +43,8 @@ pub struct Parameters {
     pub on_violation: ViolationPolicy,
     /// Whether control may begin beyond the engage tolerance of a setpoint in motion.
     pub approach: bool,
+    /// Whether a platform that holds its pose follows a setpoint beyond the engage tolerance only after the request `engage`.
+    pub holds_on_return: bool,
     /// Acceleration that feedback may add to the limits, as a ratio of them.
     pub feedback_scale: f64,
     /// Change of the payload under control that is no fault \[kg\]; `None` means the default of the machine.
@@ -58,8 +60,8 @@ pub struct Parameters {
     pub following_angular_velocity: f64,
     /// Goal of the stop of a platform that lost its setpoint.
     pub after_loss: AfterStop,
-    /// Time for which a platform without setpoints holds its pose before it parks, if that is the goal \[ns\].
-    pub lost_park_ns: u64,
+    /// Time for which a platform without setpoints holds its pose before it parks or stops, if that is the goal \[ns\].
+    pub lost_hold_ns: u64,
     /// Largest position error at which control may begin \[m\].
     pub engage_position: f64,
     /// Largest orientation error at which control may begin \[rad\].

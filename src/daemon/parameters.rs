@@ -71,9 +71,10 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         condition: limits.condition,
         envelope,
         after_loss: control.on_setpoint_lost,
-        lost_park_ns: nanoseconds(control.lost_park_s),
+        lost_hold_ns: nanoseconds(control.lost_hold_s),
         on_violation: deployment.setpoint.on_violation,
         approach: deployment.setpoint.approach,
+        holds_on_return: deployment.setpoint.holds_on_return,
         // A ratio of the scaled limits.
         feedback_scale: limits.feedback_scale / limits.scale,
         payload_change_kg: limits.payload_change_kg,

@@ -195,6 +195,22 @@ pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     })
 }
 
+/// Angles \[rad\] of the universal joint of each leg at a pose, about its first axis u, then about its second axis `u x n / |u x n|`;
+/// both are 0 at home. Undefined where a leg is aligned with its first axis, see [`universal_sine`].
+pub fn universal_joint_angles(machine: &Machine, pose: &Pose) -> [[f64; 2]; LEGS] {
+    let joints = &machine.joints;
+    let mut axes = joints.triples.unpack_vectors(&joints.universal_axis).into_iter();
+    let mut legs =
+        leg_directions(machine, &machine.home_pose()).into_iter().zip(leg_directions(machine, pose));
+    core::array::from_fn(|_| {
+        let (u, (home, n)) = axes.next().zip(legs.next()).unwrap_or_default();
+        let [second_at_home, second] = [u.cross(&home), u.cross(&n)];
+        let about_u = libm::atan2(u.dot(&second_at_home.cross(&second)), second_at_home.dot(&second));
+        let from_u = |second: &Vector3<f64>, leg: &Vector3<f64>| libm::atan2(second.norm(), u.dot(leg));
+        [about_u, from_u(&second, &n) - from_u(&second_at_home, &home)]
+    })
+}
+
 /// Smallest sine of the angle between a leg and the first axis of its universal joint, over the six legs. It
 /// is 0 if a leg is aligned with its axis.
 pub fn universal_sine(machine: &Machine, pose: &Pose) -> f64 {

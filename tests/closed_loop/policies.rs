@@ -156,12 +156,12 @@ fn a_source_that_dies_and_comes_back_elsewhere_is_no_fault() {
     }
 }
 
-/// A simulator dies while the platform is tilted: the pose is held, and after `lost_park_s` the platform moves home.
+/// A simulator dies while the platform is tilted: the pose is held, and after `lost_hold_s` the platform moves home.
 #[test]
 fn a_platform_without_setpoints_parks_if_the_file_says_so() {
     for goal in [AfterStop::Fault, AfterStop::Park] {
         let mut config = with_policy("motion_base", ViolationPolicy::Limit);
-        (config.deployment.control.on_setpoint_lost, config.deployment.control.lost_park_s) = (goal, 0.5);
+        (config.deployment.control.on_setpoint_lost, config.deployment.control.lost_hold_s) = (goal, 0.5);
         let mut ride = Ride::new(&config);
         let there = beside(&ride.home, Vector6::new(0.0, 0.1, 0.0, 0.0, 0.0, 0.03));
         (0..1000).for_each(|_| _ = ride.follow(Some(there)));
@@ -173,7 +173,7 @@ fn a_platform_without_setpoints_parks_if_the_file_says_so() {
                 _ => path.push((state, diagnostic.code, 1)),
             }
         }
-        let parks = DiagnosticCode::ParkingWithoutSetpoints;
+        let parks = DiagnosticCode::WithoutSetpoints;
         let expected: &[_] = match goal {
             AfterStop::Park => &[
                 (State::Active, DiagnosticCode::None),

@@ -31,9 +31,12 @@ impl<'a> Scene<'a> {
     fn new(policy: ViolationPolicy, state: &'a str, event: &'a str) -> Self {
         let mut config = with_policy(MACHINE, policy);
         config.deployment.setpoint.approach = event.contains("setpoint.approach");
-        if event.contains("on_setpoint_lost") {
-            (config.deployment.control.on_setpoint_lost, config.deployment.control.lost_park_s) =
-                (AfterStop::Park, 0.5);
+        config.deployment.setpoint.holds_on_return = event.contains(r#"on_return = "hold""#);
+        let goals = [("park", AfterStop::Park), ("stop", AfterStop::Standby)];
+        let goal = goals.iter().find(|(goal, _)| event.contains(&format!(r#"on_setpoint_lost = "{goal}""#)));
+        if let Some((_, goal)) = goal {
+            (config.deployment.control.on_setpoint_lost, config.deployment.control.lost_hold_s) =
+                (*goal, 0.5);
         }
         let motion = fit(&config.machine, BuiltInMotion::Sines, 8.0);
         let mut scene = Self { ride: Ride::new(&config), motion, state, event };

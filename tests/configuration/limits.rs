@@ -41,7 +41,7 @@ fn setpoints_beyond_the_limits_end_in_a_stop_unless_the_policy_is_limit() {
     let Violation { key, bound, .. } = &violation;
     assert_eq!(
         (key.as_str(), bound.as_str()),
-        ("setpoint.policy", "unknown key, must be one of: on_violation, approach")
+        ("setpoint.policy", "unknown key, must be one of: on_violation, approach, on_return")
     );
 }
 

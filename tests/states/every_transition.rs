@@ -14,11 +14,12 @@ const GOALS: [AfterStop; 3] = [AfterStop::Standby, AfterStop::Park, AfterStop::F
 /// Every so manieth state with goal and cause in a short run: each state and goal, each cause in some.
 const SHORT_MODES: usize = 5;
 
-/// A code of each kind that the state machine treats differently: brakes, holds, parks, no fault, stops, lost.
-const DISTINCT: [DiagnosticCode; 6] = [
+/// A code of each kind that the state machine treats differently: brakes, holds (two), no fault, stops, lost (two).
+const DISTINCT: [DiagnosticCode; 7] = [
     DiagnosticCode::FollowingError,
     DiagnosticCode::HoldingPose,
-    DiagnosticCode::ParkingWithoutSetpoints,
+    DiagnosticCode::SetpointTooFar,
+    DiagnosticCode::WithoutSetpoints,
     DiagnosticCode::OperatorRequest,
     DiagnosticCode::SetpointJumped,
     DiagnosticCode::SetpointLost,
@@ -166,7 +167,7 @@ fn takes_no_force_unasked(
         "{}",
         what()
     );
-    let holds = found.tracking.is_err_and(|diagnostic| diagnostic.code == DiagnosticCode::HoldingPose);
+    let holds = found.tracking.is_err_and(|diagnostic| oracle::HOLDS.contains(&diagnostic.code));
     let may_follow = found.tracking.is_ok() || holds && then.state == State::Engaging;
     assert!(!matches!(then.state, State::Engaging | State::Active) || !had || may_follow, "{}", what());
     // What is followed has no cause left from before.

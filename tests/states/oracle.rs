@@ -40,6 +40,10 @@ fn changes(cause: Option<Diagnostic>) -> Option<Diagnostic> {
     cause.filter(|it| [DiagnosticCode::PayloadChanged, DiagnosticCode::Impact].contains(&it.code))
 }
 
+/// Without setpoints, or with distant ones after that.
+pub const HOLDS: [DiagnosticCode; 2] = [DiagnosticCode::HoldingPose, DiagnosticCode::SetpointTooFar];
+const LOSSES: [DiagnosticCode; 2] = [DiagnosticCode::SetpointLost, DiagnosticCode::WithoutSetpoints];
+
 #[expect(clippy::too_many_lines, reason = "the state machine again, written from its table")]
 pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, after_loss: AfterStop) -> Next {
     use Request::{Clear, Engage, Estop, Off, Park, Stop};
@@ -61,8 +65,11 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
     let could_engage = found.localization.and(found.engagement);
     let could_start = found.localization.and(found.start);
     // Without setpoints it holds its pose, if the policy lets it, and is engaging until there are some again.
-    let holds = trouble.filter(|found| found.code == DiagnosticCode::HoldingPose);
+    let holds = trouble.filter(|found| HOLDS.contains(&found.code));
+    // Where only its distance keeps it from the setpoint, an operator may let it go there.
+    let is_resumed = is(Engage) && holds.is_some_and(|found| found.code == DiagnosticCode::SetpointTooFar);
     let goes_on = match holds {
+        Some(_) if is_resumed => mode(S::Engaging, DiagnosticCode::None, now.after),
         Some(cause) => mode(S::Engaging, cause, now.after),
         None => mode(now.state, DiagnosticCode::None, now.after),
     };
@@ -94,12 +101,7 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
         (idle && is(Clear), &|| (shown(found), None)),
         (idle, &|| (rest, None)),
         // What cannot be followed any more ends in a stop, whatever is asked.
-        (ends.is_some_and(|found| found.code == DiagnosticCode::SetpointLost), &|| {
-            to_stop(ends.unwrap(), after_loss)
-        }),
-        (ends.is_some_and(|found| found.code == DiagnosticCode::ParkingWithoutSetpoints), &|| {
-            to_stop(ends.unwrap(), AfterStop::Park)
-        }),
+        (ends.is_some_and(|found| LOSSES.contains(&found.code)), &|| to_stop(ends.unwrap(), after_loss)),
         (ends.is_some_and(|found| found.code.is_fault()), &|| to_stop(ends.unwrap(), AfterStop::Fault)),
         (ends.is_some(), &|| to_stop(ends.unwrap(), AfterStop::Standby)),
         (follows && is(Stop), &|| to_stop(requested, AfterStop::Standby)),

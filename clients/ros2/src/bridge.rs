@@ -157,6 +157,7 @@ impl Output {
         }
         let before = std::mem::replace(&mut self.before, motion);
         let Some(motion) = &motion else { return };
+        let _ = self.joint_states.publish(telemetry.universal_joint_state(motion));
         let _ = self.transforms.publish(telemetry.transform(motion));
         let _ = self.poses.publish(telemetry.pose(motion));
         let _ = self.twists.publish(telemetry.twist(motion));

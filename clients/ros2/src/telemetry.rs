@@ -3,7 +3,7 @@
 use hexad::config::Config;
 use hexad::control::signals::inputs::Measurement;
 use hexad::messages::{MeasuredMessage, StatusMessage};
-use hexad::model::inverse_geometry::leg_lengths_and_rates;
+use hexad::model::inverse_geometry::{leg_lengths_and_rates, universal_joint_angles};
 use hexad::model::rigid::{Acceleration, Pose, Twist};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
@@ -70,6 +70,20 @@ impl Telemetry<'_> {
             position: measurement.length.into(),
             velocity: measurement.rate.or(estimated).map(Into::into).unwrap_or_default(),
             effort: measurement.drives.force.map(Into::into).unwrap_or_default(),
+        }
+    }
+
+    /// Angles of the universal joints, which follow from the pose. With them a viewer of the URDF shows the legs.
+    pub fn universal_joint_state(&self, motion: &PlatformMotion) -> ros::JointState {
+        let angles = universal_joint_angles(&self.config.machine, &motion.pose);
+        let names = (1..=angles.len())
+            .flat_map(|leg| ["first", "second"].map(|axis| format!("universal_{axis}_{leg}")));
+        ros::JointState {
+            header: self.header(motion.time_ns),
+            name: names.collect(),
+            position: angles.into_iter().flatten().collect(),
+            velocity: Vec::new(),
+            effort: Vec::new(),
         }
     }
 

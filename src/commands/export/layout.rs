@@ -153,3 +153,42 @@ fn plate(points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let half = normal * (0.02 * spread.trace().sqrt());
     points.iter().flat_map(|point| [point + half, point - half]).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Unit;
+
+    use super::*;
+    use crate::config::Config;
+    use crate::model::inverse_geometry::universal_joint_angles;
+    use crate::model::task::pose_of;
+
+    /// The chain of joints of a leg, as a reader of the exported file computes it, ends at the joint of the platform.
+    #[test]
+    fn universal_joint_angles_take_each_leg_to_its_joint_on_the_platform() {
+        for text in
+            [include_str!("../../../config/motion_base.toml"), include_str!("../../../config/fried2008.toml")]
+        {
+            let machine = Config::parse(text, "a test").unwrap().machine;
+            let home = home(&machine);
+            for k in 0..50 {
+                let of = |i: i32| 0.1 * f64::from((37 * k + 11 * i) % 19 - 9) / 9.0;
+                let moved = pose_of(&[of(1), of(2), of(3), 0.5 * of(4), 0.5 * of(5), 0.5 * of(6)]);
+                let pose = Pose {
+                    position: home.position + moved.position,
+                    rotation: home.rotation * moved.rotation,
+                };
+                let lengths = leg_lengths(&machine, &pose);
+                for (leg, angles) in legs(&machine).iter().zip(universal_joint_angles(&machine, &pose)) {
+                    let axes = [leg.first_axis, Vector3::x()];
+                    let [first, second] = [0, 1].map(|axis| {
+                        Rotation3::from_axis_angle(&Unit::new_normalize(axes[axis]), angles[axis])
+                    });
+                    let along = first * second * Vector3::z() * leg.of(&lengths);
+                    let ball = pose.position + pose.rotation * leg.platform;
+                    assert!((leg.base + leg.rotation * along - ball).norm() < 1e-12, "{angles:?}");
+                }
+            }
+        }
+    }
+}

@@ -40,8 +40,8 @@ const MAX_ENGAGE_RAD: f64 = 0.2;
 /// Largest following errors that a configuration may allow \[m\], \[rad\].
 const MAX_FOLLOWING_M: f64 = 1.0;
 const MAX_FOLLOWING_RAD: f64 = 1.0;
-/// Default of `lost_park_s`: longer than the restart of a simulator, short enough for people on a tilted platform.
-const DEFAULT_LOST_PARK_S: f64 = 10.0;
+/// Default of `lost_hold_s`: longer than the restart of a simulator, short enough for people on a tilted platform.
+const DEFAULT_LOST_HOLD_S: f64 = 10.0;
 /// Default of the largest velocity errors over the velocity limits: far above the noise of rates, and reached by a free
 /// fall within hundredths of a second.
 const DEFAULT_VELOCITY_ERROR_RATIO: f64 = 0.3;
@@ -84,8 +84,8 @@ pub struct Control {
     pub estimator_bandwidth_hz: f64,
     /// State after the stop of a platform that lost its setpoint.
     pub on_setpoint_lost: AfterStop,
-    /// Time for which a platform without setpoints holds its pose before it parks.
-    pub lost_park_s: f64,
+    /// Time for which a platform without setpoints holds its pose before it parks or stops.
+    pub lost_hold_s: f64,
     /// Largest error [`FidelityChoice::Auto`] may make, as a share of the peak force of the envelope.
     pub fidelity_tolerance: f64,
     /// Effective masses of the legs at home, and the loop gains of their modes.
@@ -138,7 +138,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     };
     let by_friction =
         velocity_errors_by_friction(machine, &leg_masses, [orientation_bandwidth_hz, position_bandwidth_hz]);
-    let (on_setpoint_lost, lost_park_s) = setpoint_loss(&mut section);
+    let (on_setpoint_lost, lost_hold_s) = setpoint_loss(&mut section);
     let mut up_to = |key, default, most| section.number_or(key, default, Bound::UpTo(most));
     let control = Control {
         mode,
@@ -166,18 +166,18 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         disturbance_m_s2_per_sqrt_s,
         estimator_bandwidth_hz: plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops),
         on_setpoint_lost,
-        lost_park_s,
+        lost_hold_s,
         leg_masses,
     };
     section.finish();
     control
 }
 
-/// Goal of a platform that lost its setpoint, and the time for which it holds its pose before it parks.
+/// Goal of a platform that lost its setpoint, and the time for which it holds its pose before.
 fn setpoint_loss(section: &mut SectionReader) -> (AfterStop, f64) {
-    let goals = [("fault", AfterStop::Fault), ("park", AfterStop::Park)];
+    let goals = [("fault", AfterStop::Fault), ("stop", AfterStop::Standby), ("park", AfterStop::Park)];
     let goal = section.choice_or("on_setpoint_lost", AfterStop::Fault, &goals);
-    (goal, section.number_or("lost_park_s", DEFAULT_LOST_PARK_S, Bound::Positive))
+    (goal, section.number_or("lost_hold_s", DEFAULT_LOST_HOLD_S, Bound::Positive))
 }
 
 /// Largest velocity errors of the platform where unstated friction of all legs reverses at once, in loops of these

@@ -83,6 +83,8 @@ pub struct SetpointPolicy {
     pub on_violation: ViolationPolicy,
     /// Whether control may begin beyond the engage tolerance of a source in motion.
     pub approach: bool,
+    /// Whether a source that is back, away from the platform, is followed only after the request `engage`.
+    pub holds_on_return: bool,
 }
 
 /// Section `[timeouts]`: largest ages of the newest messages.
@@ -130,8 +132,9 @@ fn setpoint(mut section: SectionReader) -> SetpointPolicy {
     let policies = [("stop", ViolationPolicy::Stop), ("limit", ViolationPolicy::Limit)];
     let on_violation = section.choice_or("on_violation", ViolationPolicy::Stop, &policies);
     let approach = section.flag_or("approach", false);
+    let holds_on_return = section.choice_or("on_return", false, &[("follow", false), ("hold", true)]);
     section.finish();
-    SetpointPolicy { on_violation, approach }
+    SetpointPolicy { on_violation, approach, holds_on_return }
 }
 
 fn in_position(mut section: SectionReader, noise: &SensorNoise, machine: &Machine) -> InPositionWindow {

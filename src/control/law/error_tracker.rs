@@ -32,7 +32,7 @@ pub(in crate::control) fn setpoint_error(
     setpoint: &ValidatedSetpoint<'_>,
     Located { measurement, platform, .. }: &Located<'_>,
 ) -> Option<PoseError> {
-    let target = setpoint.target.as_ref().filter(|_| setpoint.age_check.is_ok())?;
+    let target = setpoint.target.as_ref().filter(|_| setpoint.follow_check.is_ok())?;
     let desired = target.motion_at(&cycle.constants.parameters, measurement.time_ns)?;
     Some(PoseError::new(&desired, &platform.pose, &platform.twist))
 }

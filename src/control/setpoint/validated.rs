@@ -12,8 +12,8 @@ pub(in crate::control) struct ValidatedSetpoint<'a> {
     pub valid: Option<&'a SetpointMotion>,
     /// Target of the reference that the setpoint requests.
     pub target: Option<Target<'a>>,
-    /// Whether the valid setpoint is recent enough.
-    pub age_check: Result<(), Diagnostic>,
+    /// Whether the valid setpoint may be followed: recent enough, and after a loss near enough.
+    pub follow_check: Result<(), Diagnostic>,
     /// Limits that the newest setpoint is near.
     pub active_limits: LimitSet,
 }
@@ -23,7 +23,7 @@ impl<'a> ValidatedSetpoint<'a> {
     #[inline(never)]
     pub fn target_in(&self, constants: &'a Constants, state: State) -> Option<Target<'a>> {
         match state {
-            State::Engaging | State::Active => self.target.filter(|_| self.age_check.is_ok()),
+            State::Engaging | State::Active => self.target.filter(|_| self.follow_check.is_ok()),
             State::Parking => Some(Target::Pose { pose: constants.home.pose(), speed_share: 1.0 }),
             State::Off | State::Standby | State::Stopping | State::Fault => None,
         }

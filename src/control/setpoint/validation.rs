@@ -15,6 +15,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::ReferenceGenerator;
@@ -25,7 +26,7 @@ use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::PoseError;
-use crate::control::signals::inputs::{Setpoint, SetpointKind};
+use crate::control::signals::inputs::{Input, Setpoint, SetpointKind};
 use crate::control::signals::limits::{Limit, LimitSet, Limits, largest_ratio};
 use crate::control::signals::state::{AfterStop, State};
 use crate::control::signals::time::seconds_between;
@@ -56,10 +57,11 @@ impl SetpointValidator {
     pub fn validate(
         &mut self,
         cycle: &Cycle<'_>,
-        newest: Option<&Setpoint>,
+        input: &Input,
+        holds_pose: bool,
         reference: &ReferenceGenerator,
     ) -> ValidatedSetpoint<'_> {
-        let new = newest.filter(|newest| self.last.is_new(newest));
+        let new = input.setpoint.as_ref().filter(|newest| self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| {
             let parameters = &cycle.constants.parameters;
             let mut new = SetpointMotion::new(*new);
@@ -68,10 +70,14 @@ impl SetpointValidator {
         });
         self.missed_cycles += u64::from(cycle.state.has_control() && !is_accepted);
         let valid = self.last.valid.as_ref();
+        let target = valid.map(|valid| Target::of_setpoint(valid, &self.samples));
         ValidatedSetpoint {
             valid,
-            target: valid.map(|valid| Target::of_setpoint(valid, &self.samples)),
-            age_check: self.check_age(cycle),
+            target,
+            follow_check: self.check_age(cycle).and_then(|()| match &target {
+                Some(target) if holds_pose => check_return(cycle.constants, target, reference),
+                _ => Ok(()),
+            }),
             active_limits: self.active_limits,
         }
     }
@@ -91,14 +97,14 @@ impl SetpointValidator {
         if is_followed && setpoint.kind == SetpointKind::Target {
             return Ok(());
         }
-        let Parameters { on_violation, setpoint_timeout_ns, after_loss, lost_park_ns, .. } =
+        let Parameters { on_violation, setpoint_timeout_ns, after_loss, lost_hold_ns, .. } =
             &cycle.constants.parameters;
         let is_at_rest = motion.twist.vector().amax() == 0.0 && motion.acceleration.vector().amax() == 0.0;
         let (release_ns, timeout_ns) = (cycle.release_ns, *setpoint_timeout_ns);
         if *on_violation == ViolationPolicy::Limit && is_followed {
-            if *after_loss == AfterStop::Park {
+            if *after_loss != AfterStop::Fault {
                 let (code, longest_ns) =
-                    (DiagnosticCode::ParkingWithoutSetpoints, timeout_ns.saturating_add(*lost_park_ns));
+                    (DiagnosticCode::WithoutSetpoints, timeout_ns.saturating_add(*lost_hold_ns));
                 check_time_stamp(code, setpoint.time_ns, release_ns, longest_ns)?;
             }
             return check_time_stamp(DiagnosticCode::HoldingPose, setpoint.time_ns, release_ns, timeout_ns);
@@ -134,6 +140,22 @@ impl SetpointValidator {
         self.last.record(&new.setpoint, result.map(|()| new), now_ns, is_following(cycle.state));
         result.is_ok()
     }
+}
+
+/// Whether a platform that holds its pose after a loss may follow again: a target near the reference, or any, as configured.
+#[inline(never)]
+fn check_return(
+    constants: &Constants,
+    target: &Target<'_>,
+    reference: &ReferenceGenerator,
+) -> Result<(), Diagnostic> {
+    let parameters = &constants.parameters;
+    if !parameters.holds_on_return {
+        return Ok(());
+    }
+    let offset = reference.offset_to(constants, target);
+    let ratio = offset.map_or(f64::INFINITY, |offset| parameters.engage_tolerance_ratio(&offset));
+    if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0)) }
 }
 
 fn is_following(state: State) -> bool {

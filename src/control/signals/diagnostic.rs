@@ -193,10 +193,10 @@ codes! {
         "the drives are too weak for this pose, or for a stop from this motion",
         "move the platform towards home without hexad; check actuator.max_force_n and the payload in the \
         machine file";
-    /// Without setpoints the platform held its pose for `control.lost_park_s`: it parks.
-    ParkingWithoutSetpoints = 16, None,
-        absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms and control.lost_park_s, together"),
-        "no setpoints: the platform parks",
+    /// Without setpoints the platform held its pose for `control.lost_hold_s`: it parks or stops.
+    WithoutSetpoints = 16, None,
+        absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms and control.lost_hold_s, together"),
+        "no setpoints: control ends",
         "find out why the source sends no setpoints";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop,

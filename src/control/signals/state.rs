@@ -17,8 +17,8 @@
 //! The platform may still move when control begins, by `engage` or `park`. Both requests are refused if no
 //! stop within every limit exists for its motion. Under `[setpoint] on_violation = "limit"` a platform
 //! without setpoints comes to rest and holds its pose in the state engaging, which is no fault. When
-//! setpoints arrive again, it moves onto them. With `control.on_setpoint_lost = "park"` it parks after
-//! `control.lost_park_s`.
+//! setpoints arrive again, it moves onto them; with `setpoint.on_return = "hold"` only if they are near, or after `engage`. With
+//! `control.on_setpoint_lost = "park"` or `"stop"` it parks or stops after `control.lost_hold_s`.
 
 use serde::{Deserialize, Serialize};
 

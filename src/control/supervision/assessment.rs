@@ -102,7 +102,7 @@ fn check_tracking(
     }
     check_deadline(input)?;
     if let State::Engaging | State::Active = cycle.state {
-        setpoint.age_check?;
+        setpoint.follow_check?;
     }
     *conditioned
 }
@@ -119,7 +119,7 @@ fn check_engagement(
     check_no_second_publisher(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers)?;
     check_drives_and_external_pose(evidence)?;
     (*conditioned)?;
-    setpoint.age_check?;
+    setpoint.follow_check?;
     check_engage_tolerance(&cycle.constants.parameters, setpoint, *error)?;
     *start
 }
@@ -144,7 +144,7 @@ fn has_ended(
         deviation.map_or(f64::INFINITY, |deviation| parameters.engage_tolerance_ratio(&deviation))
     };
     if let State::Engaging = cycle.state
-        && setpoint.age_check.is_ok()
+        && setpoint.follow_check.is_ok()
         && let Some(target) = &setpoint.target
     {
         return has_arrived(ratio(target), parameters.on_violation, cycle.release_ns, near_since_ns);

@@ -26,6 +26,11 @@ pub struct SupervisorState {
     pub after: AfterStop,
 }
 
+/// Whether a platform that was following holds its pose for this reason.
+fn ends_in_hold(code: DiagnosticCode) -> bool {
+    code == DiagnosticCode::HoldingPose || code == DiagnosticCode::SetpointTooFar
+}
+
 /// Findings of one cycle that decide the next state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Findings {
@@ -57,6 +62,11 @@ pub(in crate::control) struct Supervisor {
 }
 
 impl Supervisor {
+    /// Whether the platform holds its pose, because setpoints were lost.
+    pub fn holds_pose(&self) -> bool {
+        self.current.state == State::Engaging && ends_in_hold(self.current.diagnostic.code)
+    }
+
     /// Request of an input, if it was not answered before. Each request is carried out once.
     pub fn new_request(&self, input: &Input) -> Option<OperatorRequest> {
         input.request.filter(|request| request.message != self.answered_message)
@@ -195,13 +205,14 @@ fn following(
     if let Err(diagnostic) = findings.tracking {
         let after = match diagnostic.code {
             // The platform holds its pose and engages again from there.
-            DiagnosticCode::HoldingPose => {
+            code if ends_in_hold(code) => {
+                let resumes = code == DiagnosticCode::SetpointTooFar && request == Some(Request::Engage);
+                let diagnostic = if resumes { Diagnostic::default() } else { diagnostic };
                 (current, has_ended) =
                     (SupervisorState { state: State::Engaging, diagnostic, ..current }, false);
                 None
             }
-            DiagnosticCode::SetpointLost => Some(after_loss),
-            DiagnosticCode::ParkingWithoutSetpoints => Some(AfterStop::Park),
+            DiagnosticCode::SetpointLost | DiagnosticCode::WithoutSetpoints => Some(after_loss),
             code if code.is_fault() => Some(AfterStop::Fault),
             _ => Some(AfterStop::Standby),
         };

@@ -68,7 +68,7 @@ impl Scene {
         let setpoint = ValidatedSetpoint {
             valid: Some(&motion),
             target: Some(Target::Motion(&motion)),
-            age_check: self.status,
+            follow_check: self.status,
             active_limits: LimitSet::default(),
         };
         let free_motion =

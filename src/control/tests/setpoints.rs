@@ -38,7 +38,7 @@ fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
         let setpoint = ValidatedSetpoint {
             valid: Some(&motion),
             target: Some(Target::of_setpoint(&motion, &samples)),
-            age_check: status,
+            follow_check: status,
             active_limits: LimitSet::default(),
         };
         for state in [State::Engaging, State::Active] {

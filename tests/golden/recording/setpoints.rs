@@ -30,7 +30,7 @@ const PARKS: &str = "
 on_violation = \"limit\"
 [control]
 on_setpoint_lost = \"park\"
-lost_park_s = 0.2
+lost_hold_s = 0.2
 ";
 
 /// Drives that the limits of the reference demand too much of.

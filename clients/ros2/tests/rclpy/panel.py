@@ -125,13 +125,17 @@ def follows(source, seconds=6.0):
 
 
 def state():
-    for topic, kind in [("/joint_states", JointState), ("/pose", PoseStamped), ("/twist", TwistStamped), ("/acceleration", AccelStamped)]:
+    # Measured lengths and the angles of universal joints are two messages.
+    node.create_subscription(JointState, "/joint_states", lambda message: newest.update({message.name[0]: message}), qos_profile_sensor_data)
+    for topic, kind in [("/pose", PoseStamped), ("/twist", TwistStamped), ("/acceleration", AccelStamped)]:
         listen(topic, kind)
-    wait("state", lambda: len(newest) == 4)
+    wait("state", lambda: len(newest) == 5)
 
 
 def check_state():
-    joints = newest["/joint_states"]
+    angles = newest["universal_first_1"]
+    assert len(angles.name) == 12 and max(map(abs, angles.position)) < 0.01, "at home they are 0"
+    joints = newest["prismatic_1"]
     assert joints.name == ["prismatic_%d" % (leg + 1) for leg in range(6)], joints.name
     assert all(1.1 < length < 2.3 for length in joints.position) and len(joints.velocity) == 6, joints
     assert newest["/pose"].header.frame_id == "base" and abs(newest["/pose"].pose.position.z - HOME_Z) < 1e-3
