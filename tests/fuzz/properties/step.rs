@@ -64,6 +64,8 @@ impl<'a> Play<'a> {
         deployment.control.mode = mode;
         deployment.noise.rate_m_s = has_rates.then_some(1e-4);
         deployment.setpoint.on_violation = policy;
+        // Both ways to return are played, each with one kind of driver.
+        deployment.setpoint.holds_on_return = has_rates;
         let parameters = daemon::parameters(&CONFIG.machine, &deployment, Fidelity::Exact);
         Self {
             bytes,
