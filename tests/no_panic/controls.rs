@@ -9,7 +9,7 @@ pub type Control = (&'static str, &'static str);
 
 /// Names the functions in a table that keeps them in the executable.
 macro_rules! controls {
-    ($($name:ident: $finding:literal,)*) => {
+    ($($name:ident: $finding:expr,)*) => {
         pub fn all() -> Vec<Control> {
             vec![$({
                 black_box($name as *const ());
@@ -37,7 +37,8 @@ controls! {
     arithmetic_of_the_system: "atan2",
     system_call: "trap or system call",
     pointer: "call through a pointer",
-    pointer_that_may_change: "code without a name",
+    // x86-64 code names the place of the pointer, and the analysis reads it.
+    pointer_that_may_change: if cfg!(target_arch = "x86_64") { "code without a name" } else { "call through a pointer" },
     tail_call_of_pointer: "call through a pointer",
     method_of_object: "call through a pointer",
     one_of_two_pointers: "call through a pointer",
