@@ -17,7 +17,7 @@ use crate::model::sensitivity::Sensitivity;
 
 /// Step size (radian, or radius) below which the iteration ends. The legs then agree with the pose to all
 /// practical digits. The pose still takes this step, so it is exact to rounding.
-const CONVERGED_STEP: f64 = 1e-12;
+pub(super) const CONVERGED_STEP: f64 = 1e-12;
 
 /// Approximate number of rounding errors that add up in a residual.
 const ROUNDING_ERRORS_PER_RESIDUAL: f64 = 8.0;
