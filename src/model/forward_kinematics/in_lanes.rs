@@ -1,12 +1,11 @@
 //! Forward kinematics of many poses: eight at once, one per lane.
 //!
-//! Newton's method of [`super::newton`] with a new factorization in each step: a chord step would save a third of a step, and
-//! each lane would need another. A lane for which the trusted region does not prove the outcome is solved alone by [`refine`].
+//! Newton's method of [`super::newton`], but with a new factorization in each step, as lanes differ in where an old one would do. A lane for which the trusted region does not prove the outcome is solved alone by [`refine`].
 
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix3, Vector3};
 
-use super::newton::CONVERGED_STEP;
+use super::newton::{CONVERGED_STEP, rounding};
 use super::{MAX_CONDITION, MAX_NEWTON_STEPS, Outcome, refine};
 use crate::model::LEGS;
 use crate::model::factorization::are_regular_blocks;
@@ -126,7 +125,7 @@ fn solved<S: Simd>(
             break;
         }
     }
-    let mut is_proved = certificate.holds(joints);
+    let mut is_proved = certificate.holds(joints, starts);
     for (is_proved, error) in is_proved.iter_mut().zip(error) {
         *is_proved &= is_rounding(error);
     }
@@ -139,7 +138,6 @@ struct Certificate<S: Simd> {
     curvature: f64x8<S>,
     /// Square of the first step.
     first: f64x8<S>,
-    /// Square of the condition.
     condition: f64x8<S>,
     determinants: [f64x8<S>; 2],
 }
@@ -175,7 +173,7 @@ fn first_step<S: Simd>(
     let certificate = Certificate {
         curvature: (curvature * inverse).sqrt(),
         first: size_squared(&step, linear_weight),
-        condition: wrench * inverse,
+        condition: (wrench * inverse).sqrt(),
         determinants: [factorization.d_a, factorization.d_s],
     };
     (step, certificate)
@@ -184,16 +182,19 @@ fn first_step<S: Simd>(
 impl<S: Simd> Certificate<S> {
     /// Whether the outcome is [`Outcome::Solved`], clear of all bounds; not for NaN.
     #[inline(always)]
-    fn holds(&self, joints: &Joints) -> [bool; LANES] {
+    fn holds(&self, joints: &Joints, starts: &[Pose; LANES]) -> [bool; LANES] {
         let [d_a, d_s] = [self.determinants[0].to_array(), self.determinants[1].to_array()];
         let numbers = self.curvature.to_array().into_iter().zip(self.first.to_array());
         let numbers = numbers.zip(self.condition.to_array()).zip(d_a.into_iter().zip(d_s));
         let mut holds = [false; LANES];
-        for (holds, (((curvature, first), condition), (d_a, d_s))) in holds.iter_mut().zip(numbers) {
+        for ((holds, start), (((curvature, first), condition), (d_a, d_s))) in
+            holds.iter_mut().zip(starts).zip(numbers)
+        {
+            // After a first step this short `refine` ends, or it omits the step as rounding.
+            let shortest = CONVERGED_STEP.max(rounding(joints, start, condition));
             *holds = first * square(curvature) <= square(CLEAR_SHARE * MAX_KANTOROVICH_H)
-                && condition <= square(CLEAR_SHARE * MAX_CONDITION / MAX_CONDITION_GROWTH)
-                // By rounding `refine` decides whether it takes such a step at all.
-                && first > square(CONVERGED_STEP)
+                && condition <= CLEAR_SHARE * MAX_CONDITION / MAX_CONDITION_GROWTH
+                && first > square(shortest / CLEAR_SHARE)
                 && are_regular_blocks(d_a, d_s, joints.radius_cubed);
         }
         holds
