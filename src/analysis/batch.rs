@@ -90,7 +90,7 @@ pub fn poses(
 }
 
 /// Writes the regressor of every motion to the same place in `regressors`, see [`regressor`]. `threads` as in [`in_parallel`].
-/// One after the other on each thread: most of the time goes into the solution for 32 columns of N.
+/// On each thread one is computed after the other.
 pub fn regressors(
     machine: &Machine,
     motions: &[Motion],
