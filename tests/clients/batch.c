@@ -41,7 +41,7 @@ int main(int count, char **arguments)
     call(machine, NULL, ROWS, x[0], forces[0]);
     call(machine, "exact", ROWS, NULL, forces[0]);
     call(machine, "exact", ROWS, x[0], NULL);
-    call(machine, "exact", ROWS, x[0], &x_accel[2][5]);
+    call(machine, "exact", ROWS, x[0], x[1]);
     call(machine, "exact", ROWS, (const double *)((const char *)x + 4), forces[0]);
     call(machine, "exact", (size_t)-1, x[0], forces[0]);
     open_wrong(NULL);

@@ -22,7 +22,7 @@ const OUTCOMES: &str = "0 ok
 3 fidelity is NULL
 3 x is NULL
 3 forces is NULL
-3 forces must be another array than x_accel: they overlap
+3 forces must be another array than x: they overlap
 3 x = ADDRESS must be a multiple of 8
 3 count = 18446744073709551615 must be at most 192153584101141162
 1 path is NULL
