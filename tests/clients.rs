@@ -5,6 +5,7 @@
 mod common;
 
 mod clients {
+    mod batch;
     mod declarations;
     mod drivers;
     mod frames;

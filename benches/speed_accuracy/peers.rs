@@ -4,7 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::Failure;
-use super::scenes::Errors;
+
+/// Errors as a share of the largest force of the row.
+#[derive(Clone, Copy, Debug)]
+pub struct Errors {
+    pub max: f64,
+    pub rms: f64,
+}
 
 /// One way, and who runs it.
 pub struct Peer {

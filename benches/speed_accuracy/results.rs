@@ -1,7 +1,7 @@
 //! What was measured: as a file, and as a table of ratios.
 
-use super::peers::PEERS;
-use super::scenes::{Errors, Pace};
+use super::peers::{Errors, PEERS};
+use super::scenes::Pace;
 use super::support::Failure;
 use super::support::charts::Charts;
 use super::timing::Samples;

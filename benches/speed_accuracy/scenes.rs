@@ -21,6 +21,7 @@ use super::Failure;
 use super::common::data;
 use super::methods::Forces;
 use super::paper::{self, State};
+use super::peers::Errors;
 
 /// The machines whose scenes are evaluated.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];
@@ -45,13 +46,6 @@ pub struct Scene {
     /// The same for the dense form; empty for the peers.
     pub states: Vec<State>,
     pub paper_machine: Option<paper::Machine>,
-}
-
-/// Errors as a share of the largest force of the row.
-#[derive(Clone, Copy, Debug)]
-pub struct Errors {
-    pub max: f64,
-    pub rms: f64,
 }
 
 impl Scene {

@@ -58,7 +58,7 @@ pub fn inverse_dynamics(
     let motions: Vec<_> = table.rows().iter().map(|row| task_state(row).motion()).collect();
     let mut forces = vec![None; motions.len()];
     let bar = item_bar(motions.len(), "rows");
-    batch::forces(&InverseDynamics::new(machine), fidelity, &motions, &mut forces, &bar);
+    batch::forces(&InverseDynamics::new(machine), fidelity, &motions, &mut forces, 0, &bar);
     bar.finish_and_clear();
     let mut writer = CsvWriter::new(&columns);
     let mut unsolved = UnsolvedRows::new("are at singular poses and have no forces");

@@ -13,7 +13,8 @@
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
 //! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], |
-//! | | [`drive_loads`], [`transmission`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu`, `pose_lanes` |
+//! | | [`drive_loads`], [`transmission`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu`, |
+//! | | `pose_factorization`, `pose_lanes` |
 //!
 //! # Errata of the print
 //!
@@ -53,6 +54,7 @@ mod lu;
 pub mod machine;
 pub mod mass_matrix;
 pub mod platform;
+mod pose_factorization;
 mod pose_lanes;
 pub mod random;
 pub mod regressor;

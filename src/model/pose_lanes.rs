@@ -1,12 +1,11 @@
 //! Inverse dynamics of many motions: eight at once, one per lane, leg after leg.
 //!
 //! The legs are evaluated by the same code as in one motion: [`super::inverse_geometry`] and [`super::leg`] do not know whether
-//! a lane is a leg or a motion. Here no lane is padding and none waits for another. The platform and the factorization of N, which
-//! exchange values between the lanes of one motion, are written out:
+//! a lane is a leg or a motion. Here no lane is padding and none waits for another. The factorization of N, which exchanges values
+//! between the lanes of one motion, is in [`super::pose_factorization`]; the platform is written out:
 //!
 //! ```text
 //! torque = R (I_G a + w x I_G w) + c x f        w = R^T omega,  a = R^T omega',  f = m (v' + S c - g)
-//! N = [ M_A  M_B ; D_A  D_B ]                   blocks as in `super::factorization`, columns in lane order
 //! ```
 //!
 //! A motion whose blocks are nearly singular is evaluated alone, by LU.
@@ -25,11 +24,9 @@ use super::fidelity::{Fidelity, LegInertia, ModelTerms, with_terms};
 use super::inverse_geometry::LegGeometry;
 use super::lanes3::Lanes3;
 use super::leg::{LegConstants, LegReaction};
+use super::pose_factorization::{Column, LANES, Matrix, PoseFactorization, vectors};
 use super::rigid::Motion;
 use super::triples::{LegLanes, Triples};
-
-/// Motions that are evaluated at once.
-const LANES: usize = 8;
 
 /// What differs from leg to leg.
 #[derive(Clone, Copy, Default)]
@@ -43,23 +40,10 @@ struct Joint {
 
 /// Column of N, and the load along the leg.
 #[derive(Clone, Copy)]
-struct Column<S: Simd> {
-    moment: Lanes3<f64x8<S>>,
-    direction: Lanes3<f64x8<S>>,
+struct LoadedColumn<S: Simd> {
+    column: Column<S>,
     axial: f64x8<S>,
 }
-
-impl<S: Simd> Column<S> {
-    #[inline(always)]
-    fn zero(simd: S) -> Self {
-        let zero = Lanes3::splat(simd, &Vector3::zeros());
-        Self { moment: zero, direction: zero, axial: zero.x }
-    }
-}
-
-/// Columns of a 3 x 3 matrix in each lane.
-#[derive(Clone, Copy)]
-struct Matrix<S: Simd>([Lanes3<f64x8<S>>; 3]);
 
 /// Eight motions, one per lane.
 struct Motions<S: Simd> {
@@ -84,7 +68,7 @@ impl InverseDynamics {
         let constants = self.leg_constants().of_one_leg();
         let joints = self.joints_in_lane_order();
         dispatch!(self.machine().level, simd => {
-            let mut columns = [Column::zero(simd); LEGS];
+            let mut columns = [LoadedColumn { column: Column::zero(simd), axial: f64x8::splat(simd, 0.0) }; LEGS];
             for (motions, forces) in motions.chunks(LANES).zip(forces.chunks_mut(LANES)) {
                 let Some(first) = motions.first() else { continue };
                 let padded: [Motion; LANES];
@@ -134,7 +118,7 @@ impl InverseDynamics {
         constants: &LegConstants,
         joints: &[Joint; LEGS],
         motions: &[Motion; LANES],
-        columns: &mut [Column<S>; LEGS],
+        columns: &mut [LoadedColumn<S>; LEGS],
     ) -> ([[f64; LANES]; LEGS], [[f64; LANES]; 2]) {
         let motions = Motions::load(simd, motions);
         let zero = Lanes3::splat(simd, &Vector3::zeros());
@@ -179,7 +163,7 @@ impl InverseDynamics {
                     [f64x8::splat(simd, joint.viscous_friction), f64x8::splat(simd, joint.coulomb_friction)];
                 axial += self.drive_force(simd, friction, velocity.rate, accel);
             }
-            *column = Column { moment: arm.cross(leg.direction), direction: leg.direction, axial };
+            *column = LoadedColumn { column: Column::new(arm, leg.direction), axial };
         }
         balanced(simd, columns, torque, force)
     }
@@ -189,65 +173,22 @@ impl InverseDynamics {
 #[inline(always)]
 fn balanced<S: Simd>(
     simd: S,
-    columns: &[Column<S>; LEGS],
+    [a0, a1, a2, b0, b1, b2]: &[LoadedColumn<S>; LEGS],
     torque: Lanes3<f64x8<S>>,
     force: Lanes3<f64x8<S>>,
 ) -> ([[f64; LANES]; LEGS], [[f64; LANES]; 2]) {
-    let one = f64x8::splat(simd, 1.0);
-    let [a0, a1, a2, b0, b1, b2] = columns;
-    let adjugate = adjugate([a0.direction, a1.direction, a2.direction]);
-    let d_a = a0.direction.dot(adjugate[0]);
-    let inverse_d_a = one / d_a;
-    let [i0, i1, i2] = [adjugate[0] * inverse_d_a, adjugate[1] * inverse_d_a, adjugate[2] * inverse_d_a];
-    let a = [a0.moment, a1.moment, a2.moment];
-    let inverse = [i0, i1, i2];
-    let [x0, x1, x2] = [
-        products(&inverse, b0.direction),
-        products(&inverse, b1.direction),
-        products(&inverse, b2.direction),
-    ];
-    let [s0, s1, s2] =
-        [eliminated(b0.moment, &x0, &a), eliminated(b1.moment, &x1, &a), eliminated(b2.moment, &x2, &a)];
-    let [c0, c1, c2] = self::adjugate([s0, s1, s2]);
-    let d_s = s0.dot(c0);
-    let inverse_d_s = one / d_s;
-
-    let [g0, g1, g2] = products(&inverse, force);
-    let rest = eliminated(torque, &[g0, g1, g2], &a);
-    let [h0, h1, h2] = [c0.dot(rest) * inverse_d_s, c1.dot(rest) * inverse_d_s, c2.dot(rest) * inverse_d_s];
+    let columns = [&a0.column, &a1.column, &a2.column, &b0.column, &b1.column, &b2.column];
+    let factorization = PoseFactorization::new(simd, columns);
+    let [f0, f1, f2, f3, f4, f5] = factorization.forces(torque, force);
     let forces = [
-        g0 - h0 * x0[0] - h1 * x1[0] - h2 * x2[0] + a0.axial,
-        g1 - h0 * x0[1] - h1 * x1[1] - h2 * x2[1] + a1.axial,
-        g2 - h0 * x0[2] - h1 * x1[2] - h2 * x2[2] + a2.axial,
-        h0 + b0.axial,
-        h1 + b1.axial,
-        h2 + b2.axial,
+        (f0 + a0.axial).to_array(),
+        (f1 + a1.axial).to_array(),
+        (f2 + a2.axial).to_array(),
+        (f3 + b0.axial).to_array(),
+        (f4 + b1.axial).to_array(),
+        (f5 + b2.axial).to_array(),
     ];
-    let [f0, f1, f2, f3, f4, f5] = forces;
-    let forces = [f0.to_array(), f1.to_array(), f2.to_array(), f3.to_array(), f4.to_array(), f5.to_array()];
-    (forces, [d_a.to_array(), d_s.to_array()])
-}
-
-/// Dot products with three vectors.
-#[inline(always)]
-fn products<S: Simd>([a, b, c]: &[Lanes3<f64x8<S>>; 3], v: Lanes3<f64x8<S>>) -> [f64x8<S>; 3] {
-    [a.dot(v), b.dot(v), c.dot(v)]
-}
-
-/// A vector less multiples of three others.
-#[inline(always)]
-fn eliminated<S: Simd>(
-    v: Lanes3<f64x8<S>>,
-    [x, y, z]: &[f64x8<S>; 3],
-    [a, b, c]: &[Lanes3<f64x8<S>>; 3],
-) -> Lanes3<f64x8<S>> {
-    v.minus_scaled(*x, *a).minus_scaled(*y, *b).minus_scaled(*z, *c)
-}
-
-/// Cross products of the two other vectors, in cyclic order.
-#[inline(always)]
-fn adjugate<S: Simd>([a, b, c]: [Lanes3<f64x8<S>>; 3]) -> [Lanes3<f64x8<S>>; 3] {
-    [b.cross(c), c.cross(a), a.cross(b)]
+    (forces, [factorization.d_a.to_array(), factorization.d_s.to_array()])
 }
 
 /// Matrix S of each motion, see [`super::platform::acceleration_map`].
@@ -260,20 +201,6 @@ fn acceleration_map<S: Simd>(w: Lanes3<f64x8<S>>, a: Lanes3<f64x8<S>>) -> Matrix
         Lanes3 { x: xy - a.z, y: -xx - zz, z: yz + a.x },
         Lanes3 { x: xz + a.y, y: yz - a.x, z: -xx - yy },
     ])
-}
-
-/// One vector of each motion.
-#[inline(always)]
-fn vectors<S: Simd>(
-    simd: S,
-    motions: &[Motion; LANES],
-    of: impl Fn(&Motion) -> Vector3<f64>,
-) -> Lanes3<f64x8<S>> {
-    Lanes3 {
-        x: f64x8::load_array(simd, motions.each_ref().map(|motion| of(motion).x)),
-        y: f64x8::load_array(simd, motions.each_ref().map(|motion| of(motion).y)),
-        z: f64x8::load_array(simd, motions.each_ref().map(|motion| of(motion).z)),
-    }
 }
 
 impl<S: Simd> Motions<S> {
@@ -291,25 +218,5 @@ impl<S: Simd> Motions<S> {
             angular_acceleration: vectors(simd, motions, |m| m.acceleration.angular),
             acceleration: vectors(simd, motions, |m| m.acceleration.linear),
         }
-    }
-}
-
-impl<S: Simd> Matrix<S> {
-    #[inline(always)]
-    fn times(&self, v: Lanes3<f64x8<S>>) -> Lanes3<f64x8<S>> {
-        let [x, y, z] = self.0;
-        (z * v.z).plus_scaled(v.y, y).plus_scaled(v.x, x)
-    }
-
-    /// Product with the same vector in all lanes.
-    #[inline(always)]
-    fn times_vector(&self, simd: S, v: &Vector3<f64>) -> Lanes3<f64x8<S>> {
-        self.times(Lanes3::splat(simd, v))
-    }
-
-    #[inline(always)]
-    fn transposed_times(&self, v: Lanes3<f64x8<S>>) -> Lanes3<f64x8<S>> {
-        let [x, y, z] = self.0;
-        Lanes3 { x: x.dot(v), y: y.dot(v), z: z.dot(v) }
     }
 }

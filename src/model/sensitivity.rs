@@ -47,7 +47,7 @@ pub struct Sensitivity {
 /// converges quadratically to a solution, and there is no other solution within the radius
 /// `(1 - sqrt(1 - 2 h)) / (B K)`. K is taken at the start. Its growth along the step costs less than the
 /// fifth of h that is left.
-const MAX_KANTOROVICH_H: f64 = 0.4;
+pub(super) const MAX_KANTOROVICH_H: f64 = 0.4;
 
 impl Sensitivity {
     /// Computes the sensitivity from legs with arms from the mean of the joints, and from their

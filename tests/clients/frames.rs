@@ -7,7 +7,7 @@ use crate::common::not_run::lacking;
 use crate::common::python::{environment, output};
 
 /// The reference.
-const PACKAGES: [&str; 2] = ["numpy==2.3.5", "scipy==1.16.3"];
+pub const PACKAGES: [&str; 2] = ["numpy==2.3.5", "scipy==1.16.3"];
 
 #[test]
 fn frames_are_those_of_scipy() {

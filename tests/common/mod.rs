@@ -81,13 +81,18 @@ pub fn machine(name: &str) -> Machine {
 
 /// The motions of a machine's vectors.
 pub fn motions(name: &str) -> Vec<Motion> {
+    states(name).iter().map(TaskState::motion).collect()
+}
+
+/// The same in task coordinates.
+pub fn states(name: &str) -> Vec<TaskState> {
     let table = Table::read(&data(name, "csv"));
     let state = |row| TaskState {
         x: table.coordinates(row, ""),
         xd: table.coordinates(row, "_rate"),
         xdd: table.coordinates(row, "_accel"),
     };
-    (0..table.rows.len()).map(|row| state(row).motion()).collect()
+    (0..table.rows.len()).map(state).collect()
 }
 
 /// A deployable machine of the folder `config`.

@@ -4,7 +4,7 @@
  *
  * Threads: every function may be called in any thread. Two calls with one client at the same time do not wait for
  * each other: the second returns HEXAD_BUSY. A client may be used in one thread and later in another.
- * hexad_last_error is that of the calling thread.
+ * hexad_last_error is that of the calling thread. A machine may be used in any number of threads at once.
  *
  * Real time: hexad_open allocates and may take milliseconds. Publishing and hexad_latest_* neither allocate nor wait,
  * except while a participant connects or leaves (up to 0.1 ms). hexad_request waits: call it in another thread.
@@ -14,6 +14,7 @@
 #define HEXAD_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include "hexad_messages.h"
 
@@ -62,6 +63,9 @@ enum hexad_result {
 
 // A program that has joined the topics of a machine.
 struct hexad_client;
+
+// The model of a machine. Any number of threads may use it at once.
+struct hexad_machine;
 
 // A tool frame and a work frame, as [[frame]] of the machine file: X of their axes and origins. Zeros: the platform, the base.
 struct hexad_frames {
@@ -199,6 +203,39 @@ enum hexad_result hexad_request(const char *machine,
                                 uint32_t request,
                                 bool until_ready,
                                 double within_s);
+
+// Reads a machine file. Returns NULL on failure; hexad_last_error has a line for each error of the file, with its place and
+// bound. The machine belongs to the caller until hexad_close_machine. No daemon is needed.
+//
+// # Safety
+//
+// `path` is NULL or a string.
+struct hexad_machine *hexad_open_machine(const char *path);
+
+// Frees the machine; NULL is allowed.
+//
+// # Safety
+//
+// `machine` is NULL or from hexad_open_machine, and is not used afterwards.
+enum hexad_result hexad_close_machine(struct hexad_machine *machine);
+
+// Forces of the actuators [N] at `count` motions: arrays of `count` rows of six numbers, one row after the other. X is alpha, beta,
+// gamma, x, y, z [rad, m]; X' and X'' are its derivatives. A row of `forces` is NaN in all six where the pose is singular or a number
+// of the motion is not finite, and the result is still HEXAD_OK. `fidelity` is "exact" or another value of `fidelity` in machine
+// files, but "auto". The work is done in `threads` threads, 0 for one per processor; the forces do not depend on their number.
+//
+// # Safety
+//
+// `machine` is NULL or from hexad_open_machine; `fidelity` is NULL or a string; `x`, `x_rate` and `x_accel` are NULL or `count` rows
+// that nobody changes, `forces` is NULL or room for as many.
+enum hexad_result hexad_inverse_dynamics_batch(const struct hexad_machine *machine,
+                                               const char *fidelity,
+                                               size_t count,
+                                               const double *x,
+                                               const double *x_rate,
+                                               const double *x_accel,
+                                               double *forces,
+                                               uint32_t threads);
 
 // Motion of the tool in the work frame while the platform moves so in the base frame. The angles are those nearest to zero.
 //

@@ -1,4 +1,4 @@
-//! libhexad: the C ABI of hexad's topics and of its control socket.
+//! libhexad: the C ABI of hexad's topics, of its control socket and of its model at many motions.
 //!
 //! The header `include/hexad.h` follows from this crate by cbindgen, the structs of the messages from
 //! `hexad messages --language c`. Nothing is declared twice. No panic leaves a function, and an error is a number with a text
@@ -6,6 +6,7 @@
 //!
 //! The sandwich of each function: [`outcome::guard`] catches panics and keeps the text, [`client::with`] checks the handle.
 
+pub mod batch;
 pub mod client;
 pub mod frames;
 pub mod outcome;

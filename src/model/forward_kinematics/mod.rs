@@ -26,6 +26,7 @@
 //! Conditioning: the condition of N amplifies errors of the lengths. Trusted steps become shorter toward a
 //! singular pose and end before it.
 
+mod in_lanes;
 mod newton;
 mod tracker;
 
@@ -33,6 +34,7 @@ use fearless_simd::dispatch;
 
 use serde::{Deserialize, Serialize};
 
+pub use in_lanes::poses_near;
 pub use tracker::{Tracker, TrackingResult};
 
 use super::LEGS;

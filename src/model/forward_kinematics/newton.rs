@@ -17,7 +17,7 @@ use crate::model::sensitivity::Sensitivity;
 
 /// Step size (radian, or radius) below which the iteration ends. The legs then agree with the pose to all
 /// practical digits. The pose still takes this step, so it is exact to rounding.
-const CONVERGED_STEP: f64 = 1e-12;
+pub(super) const CONVERGED_STEP: f64 = 1e-12;
 
 /// Approximate number of rounding errors that add up in a residual.
 const ROUNDING_ERRORS_PER_RESIDUAL: f64 = 8.0;
@@ -104,7 +104,7 @@ impl<'a, S: Simd> Newton<'a, S> {
         mut factorization: Factorization<'a, S>,
     ) -> NewtonReport {
         let Self { simd, joints, target, inverse_target } = *self;
-        let rounding = rounding(joints, kinematic_state);
+        let rounding = rounding(joints, &kinematic_state.pose, kinematic_state.sensitivity.condition);
         let last = square(rounding.max(CONVERGED_STEP)); // All sizes are squares.
         let linear_weight = f64x4::splat(simd, 1.0 / square(joints.radius));
         let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
@@ -198,9 +198,9 @@ impl<'a, S: Simd> Newton<'a, S> {
 
 /// Size of a step caused by rounding in differences of coordinates.
 #[inline(always)]
-fn rounding(joints: &Joints, start: &KinematicState) -> f64 {
-    let size = start.pose.position.norm() / joints.radius;
-    f64::EPSILON * ROUNDING_ERRORS_PER_RESIDUAL * (1.0 + size) * start.sensitivity.condition
+pub(super) fn rounding(joints: &Joints, start: &Pose, condition: f64) -> f64 {
+    let size = start.position.norm() / joints.radius;
+    f64::EPSILON * ROUNDING_ERRORS_PER_RESIDUAL * (1.0 + size) * condition
 }
 
 fn square(x: f64) -> f64 {

@@ -8,12 +8,13 @@
     MyDriver("fried2008").run()        # `name` of the machine file
 
 A program that only publishes or receives uses `Client`; an operator's panel uses `request`. `Frames` turns poses of a tool into poses of the
-platform.
+platform. `Machine` computes the forces of many motions.
 """
 
 from .client import Client, HexadError, Result, Role, judge, monotonic_ns, request, view
 from .driver import Driver, sleep_until
 from .frames import Frames, motion_of, setpoint_of
+from .machine import Machine
 from .messages import Command, Force, Measured, Setpoint, Statistics, Status
 from .motion import Motion
 
@@ -24,6 +25,7 @@ __all__ = [
     "Force",
     "Frames",
     "HexadError",
+    "Machine",
     "Measured",
     "Motion",
     "Result",

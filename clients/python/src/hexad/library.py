@@ -2,7 +2,7 @@
 
 import ctypes
 import pathlib
-from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_uint64, c_void_p
 
 from .messages import Force, Measured, Setpoint, Statistics, Status
 from .motion import FrameStruct, Motion
@@ -26,6 +26,8 @@ _FUNCTIONS = {
     "hexad_platform_motion": [POINTER(FrameStruct), POINTER(Motion), POINTER(Motion)],
     "hexad_setpoint_of_motion": [POINTER(Motion), POINTER(Setpoint)],
     "hexad_motion_of_setpoint": [POINTER(Setpoint), POINTER(Motion)],
+    "hexad_close_machine": [c_void_p],
+    "hexad_inverse_dynamics_batch": [c_void_p, c_char_p, c_size_t, *[c_void_p] * 4, c_uint32],
     "hexad_request": [c_char_p, c_uint32, c_bool, c_double],
 }
 
@@ -41,6 +43,7 @@ def load() -> ctypes.CDLL:
     library.hexad_monotonic_ns.argtypes, library.hexad_monotonic_ns.restype = [], c_uint64
     library.hexad_last_error.argtypes, library.hexad_last_error.restype = [], c_char_p
     library.hexad_open.argtypes, library.hexad_open.restype = [c_char_p, c_uint32], c_void_p
+    library.hexad_open_machine.argtypes, library.hexad_open_machine.restype = [c_char_p], c_void_p
     if library.hexad_abi() != ABI:
         raise ImportError(f"{NAME} has ABI {library.hexad_abi()}, and this package needs {ABI}")
     return library
