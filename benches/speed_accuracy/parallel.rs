@@ -3,14 +3,18 @@
 //! The legs' part is the load of the legs and the platform; the rest, the balance of the 6 x 6 matrix N, waits for all legs.
 
 use std::iter;
+use std::rc::Rc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread::{available_parallelism, scope};
 use std::time::Instant;
 
+use fearless_simd::Level;
 use hexad::analysis::batch;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{Exact, Fidelity};
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::rigid::Motion;
 use hexad::output::charts::LineStyle;
 use indicatif::ProgressBar;
@@ -42,8 +46,8 @@ const POSES: usize = 16 * 8192;
 /// Round trips between two threads in one sample.
 const ROUND_TRIPS: usize = 1000;
 
-/// Instruction sets by the legs that fit into a vector, with the name of the first in this file.
-const LEGS_AT_ONCE: [(&str, usize); 4] = [("scalar", 1), ("sse4_2", 2), ("avx2", 4), ("avx512", 8)];
+/// Instruction sets by the legs that fit into a vector.
+const LEGS_AT_ONCE: [(&str, usize); 3] = [("sse4_2", 2), ("avx2", 4), ("avx512", 8)];
 
 /// One figure: `evaluation` and `legs` by legs at once, `poses` by threads, `spinning` and `sleeping` of one hand-over.
 #[derive(Deserialize)]
@@ -82,58 +86,81 @@ pub fn measure(
     charts.write_csv(FILE, &["part", "isa", "count", "ns"], table)
 }
 
-/// A way to evaluate some legs at once: time of the whole and of the legs' part, per pose.
-struct Contender {
+/// Time of one evaluation \[ns\], by passes over the motions and whether a fence separates them.
+type Timer<'a> = Box<dyn Fn(usize, bool) -> f64 + 'a>;
+
+/// A way to evaluate some legs at once.
+struct Contender<'a> {
     isa: &'static str,
     legs: usize,
-    measure: Box<dyn Fn(bool, usize, bool) -> f64>,
-    times: [Samples; 2],
+    whole: (Timer<'a>, Samples),
+    /// The sum of these times, each with its sign, is that of the legs' part.
+    part: Vec<(f64, Timer<'a>, Samples)>,
+}
+
+impl<'a> Contender<'a> {
+    /// One leg at once.
+    fn leg_by_leg(scene: &'a Scene) -> Result<Self, Failure> {
+        let model = Rc::new(LegByLeg::new(&scene.machine));
+        let error = scene.errors(scene.motions.iter().map(|motion| model.forces(motion))).max;
+        if !(error <= 10.0 * AGREEMENT) {
+            return Err(format!(
+                "leg by leg: error {error:e} exceeds {:e} of the largest force",
+                10.0 * AGREEMENT
+            )
+            .into());
+        }
+        let legs = Rc::clone(&model);
+        let part = vec![(1.0, timer(scene, move |motion| legs.load(motion)), Samples::default())];
+        let whole = timer(scene, move |motion| model.forces(motion));
+        Ok(Self { isa: "scalar", legs: 1, whole: (whole, Samples::default()), part })
+    }
+
+    /// The lanes of an instruction set. `load_of` also writes N to memory, which is taken off: it is what `leg_wrenches` does
+    /// beyond the geometry of the legs, with which `leg_lengths` begins too.
+    fn lanes(scene: &'a Scene, isa: &'static str, legs: usize, level: Level) -> Self {
+        let model = Rc::new(InverseDynamics::new(&scene.machine_on(level)));
+        let [load, wrenches, lengths] = [(); 3].map(|()| Rc::clone(&model));
+        let load = timer(scene, move |motion| load.load_of::<Exact>(motion));
+        let wrenches = timer(scene, move |motion| leg_wrenches(wrenches.machine(), &motion.pose));
+        let lengths = timer(scene, move |motion| leg_lengths(lengths.machine(), &motion.pose));
+        let part = [(1.0, load), (-1.0, wrenches), (1.0, lengths)];
+        let part = part.into_iter().map(|(sign, timer)| (sign, timer, Samples::default())).collect();
+        let whole = timer(scene, move |motion| model.forces::<Exact>(motion));
+        Self { isa, legs, whole: (whole, Samples::default()), part }
+    }
+
+    /// Time of the whole and of the legs' part, each alone \[ns\].
+    fn rows(&self) -> [Row; 2] {
+        let part = self.part.iter().map(|(sign, _, samples)| sign * samples.latency()).sum();
+        let whole = self.whole.1.latency();
+        [("evaluation", whole), ("legs", part)].map(|(name, ns)| Row::new(name, self.isa, self.legs, ns))
+    }
+}
+
+fn timer<'a, O>(scene: &'a Scene, evaluate: impl Fn(&Motion) -> O + 'a) -> Timer<'a> {
+    Box::new(move |passes, fenced| sample(&scene.motions, passes, fenced, &evaluate))
 }
 
 fn legs_at_once(scene: &Scene, rounds: usize, omissions: &mut Omissions) -> Result<Vec<Row>, Failure> {
-    let mut contenders = vec![];
+    let mut contenders = vec![Contender::leg_by_leg(scene)?];
+    let levels = instruction_sets();
     for (isa, legs) in LEGS_AT_ONCE {
-        let level = instruction_sets().into_iter().find(|(name, _)| *name == isa).map(|(_, level)| level);
-        let motions = scene.motions.clone();
-        let measure: Box<dyn Fn(bool, usize, bool) -> f64> = match level {
-            None if legs > 1 => {
-                omissions.add(format!("{legs} legs at once"), format!("no {isa} on this processor"));
-                continue;
-            }
-            None => {
-                let model = LegByLeg::new(&scene.machine);
-                let error = scene.errors(motions.iter().map(|motion| model.forces(motion))).max;
-                if !(error <= 10.0 * AGREEMENT) {
-                    return Err(format!("leg by leg: error {error:e} of the largest force").into());
-                }
-                Box::new(move |is_whole, passes, fenced| match is_whole {
-                    true => sample(&motions, passes, fenced, |motion| model.forces(motion)),
-                    false => sample(&motions, passes, fenced, |motion| model.load(motion)),
-                })
-            }
-            Some(level) => {
-                let model = InverseDynamics::new(&scene.machine_on(level));
-                Box::new(move |is_whole, passes, fenced| match is_whole {
-                    true => sample(&motions, passes, fenced, |motion| model.forces::<Exact>(motion)),
-                    false => sample(&motions, passes, fenced, |motion| model.load_of::<Exact>(motion)),
-                })
-            }
-        };
-        contenders.push(Contender { isa, legs, measure, times: Default::default() });
-    }
-    for _ in 0..rounds {
-        for Contender { measure, times: [whole, legs], .. } in &mut contenders {
-            whole.take(scene.motions.len(), SAMPLE_S, |passes, fenced| measure(true, passes, fenced));
-            legs.take(scene.motions.len(), SAMPLE_S, |passes, fenced| measure(false, passes, fenced));
+        match levels.iter().find(|(name, _)| *name == isa) {
+            Some((_, level)) => contenders.push(Contender::lanes(scene, isa, legs, *level)),
+            None => omissions
+                .add(format!("{legs} legs at once"), format!("no {} on this processor", written(isa))),
         }
     }
-    Ok(contenders
-        .iter()
-        .flat_map(|Contender { isa, legs, times: [whole, part], .. }| {
-            let row = |name, samples: &Samples| Row::new(name, isa, *legs, samples.latency());
-            [row("evaluation", whole), row("legs", part)]
-        })
-        .collect())
+    for _ in 0..rounds {
+        for Contender { whole: (whole, samples), part, .. } in &mut contenders {
+            samples.take(scene.motions.len(), SAMPLE_S, whole);
+            for (_, timer, samples) in part {
+                samples.take(scene.motions.len(), SAMPLE_S, timer);
+            }
+        }
+    }
+    Ok(contenders.iter().flat_map(Contender::rows).collect())
 }
 
 /// The fastest of some runs, as others use the processors too.

@@ -110,7 +110,7 @@ pub const CONFIGURATION_LOG: &str = "hexad::config";
 
 /// Warning about a processor without [`has_native_arithmetic`].
 pub const SLOW_ARITHMETIC: &str = "the processor has no SSE4.2: the lanes repeat the bits of AVX2 in software, as all \
-    processors must repeat a recording; a cycle takes some twenty times as long";
+    processors must repeat a recording; a cycle takes seven times as long";
 
 /// Runs the daemon until `stop`.
 pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, DaemonError> {
