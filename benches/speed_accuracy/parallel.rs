@@ -154,9 +154,9 @@ fn legs_at_once(scene: &Scene, rounds: usize, omissions: &mut Omissions) -> Resu
     }
     for _ in 0..rounds {
         for Contender { whole: (whole, samples), part, .. } in &mut contenders {
-            samples.take(scene.motions.len(), SAMPLE_S, whole);
+            samples.take(scene.motions.len(), SAMPLE_S, &*whole);
             for (_, timer, samples) in part {
-                samples.take(scene.motions.len(), SAMPLE_S, timer);
+                samples.take(scene.motions.len(), SAMPLE_S, &*timer);
             }
         }
     }

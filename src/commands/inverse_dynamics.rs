@@ -32,8 +32,11 @@ pub struct InverseDynamicsArguments {
     joint_space: bool,
 }
 
-/// Columns of `--joint-space`, six each.
-const JOINT_SPACE: [(&str, fn(&LegDynamics) -> f64); 11] = [
+/// Name of six columns, and the value of a leg.
+type JointColumn = (&'static str, fn(&LegDynamics) -> f64);
+
+/// Columns of `--joint-space`.
+const JOINT_SPACE: [JointColumn; 11] = [
     ("joint_mass_beta", |leg| leg.mass.x),
     ("joint_mass_gamma", |leg| leg.mass.y),
     ("joint_mass_length", |leg| leg.mass.z),
