@@ -13,8 +13,10 @@
 //! | (1)-(5), (13)-(27), (37)-(45) | `kinematics.rs` |
 //! | (53)-(82), D of (87) | `dense.rs` |
 //! | (9), phi of (87), (88)-(97) | `force.rs` |
+//! | (10)-(12), (34)-(36), (46)-(52), (54): print not at hand, from their neighbours | `joint_accelerations.rs` |
 //! | which reading of a disputed equation | `form.rs` |
 //! | it agrees with the vectors | `agreement.rs` (`machine.rs`, `vectors.rs`) |
+//! | the library in joint coordinates agrees with it | `joint_space.rs` |
 //! | the printed forms do not | `errata.rs`, `last_term.rs` (2), `power.rs` (7) |
 //!
 //! Corrected, it agrees with `force_*` on all ten machines, and without spin with `force_no_spin_*`: the
@@ -79,6 +81,8 @@ use crate::common;
 
 mod agreement;
 mod errata;
+mod joint_accelerations;
+mod joint_space;
 mod last_term;
 mod power;
 mod vectors;

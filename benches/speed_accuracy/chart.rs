@@ -149,7 +149,7 @@ fn best_isa(rows: &[Row]) -> &str {
 }
 
 /// As people write it.
-fn written(name: &str) -> String {
+pub fn written(name: &str) -> String {
     let known = [
         ("avx512", "AVX-512"),
         ("avx2", "AVX2"),

@@ -16,8 +16,10 @@
 mod chart;
 #[path = "../../tests/common/mod.rs"]
 mod common;
+mod leg_by_leg;
 mod methods;
 mod paper;
+mod parallel;
 mod peers;
 mod results;
 mod scenes;
@@ -106,7 +108,8 @@ fn count(arguments: &Arguments, fidelity: &str) -> Result<(), Failure> {
 fn compare(arguments: &ChartArguments) -> Result<(), Failure> {
     let charts = arguments.charts();
     if arguments.redraw {
-        return chart::draw(&charts);
+        chart::draw(&charts)?;
+        return parallel::draw(&charts);
     }
     let begin = Instant::now();
     let mut omissions = Omissions::default();
@@ -130,6 +133,8 @@ fn compare(arguments: &ChartArguments) -> Result<(), Failure> {
     println!("{} methods on scenes, {rounds} rounds, {:.0} s", rows.len(), begin.elapsed().as_secs_f64());
     write_csv(&charts, &rows)?;
     chart::draw(&charts)?;
+    parallel::measure(&charts, &scenes, rounds, &mut omissions)?;
+    parallel::draw(&charts)?;
     omissions.finish()
 }
 

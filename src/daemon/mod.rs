@@ -19,6 +19,7 @@ use crate::config::{Config, ConfigError};
 use crate::control::signals::state::Request;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Claim, PortError};
+use crate::model::machine::has_native_arithmetic;
 use crate::operator::signal::RequestSignal;
 use crate::output::files::{FileError, write_whole};
 use crate::realtime::request_signal::post_on_signals;
@@ -107,10 +108,17 @@ const OPEN_FILES: u64 = 512;
 /// Target of the log of warnings about the configuration.
 pub const CONFIGURATION_LOG: &str = "hexad::config";
 
+/// Warning about a processor without [`has_native_arithmetic`].
+pub const SLOW_ARITHMETIC: &str = "the processor has no SSE4.2: the lanes repeat the bits of AVX2 in software, as all \
+    processors must repeat a recording; a cycle takes seven times as long";
+
 /// Runs the daemon until `stop`.
 pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, DaemonError> {
     for warning in config.examine().into_result(config)? {
         warn!(target: CONFIGURATION_LOG, "{warning}");
+    }
+    if !has_native_arithmetic(config.machine.level) {
+        warn!("{SLOW_ARITHMETIC}");
     }
     open_files::permit(OPEN_FILES).map_err(DaemonError::Files)?;
     let mut claim = Claim::take(&config.name)?;

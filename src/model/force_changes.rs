@@ -212,11 +212,7 @@ impl LegMasses {
     fn at(machine: &Machine, length: f64) -> Self {
         let (cylinder, rod) = (&machine.cylinder, &machine.rod);
         let r = length - rod.center_of_mass;
-        let transverse = |link: &Link| {
-            let inertia = &link.transverse_inertia;
-            let change = length - inertia.reference_length;
-            inertia.constant + inertia.quadratic * change * change
-        };
+        let transverse = |link: &Link| link.transverse_inertia.at(length);
         let (e1, m1, m2) = (cylinder.center_of_mass, cylinder.mass, rod.mass);
         let inertia =
             (m1 * e1 * e1 + m2 * r * r + transverse(cylinder) + transverse(rod)) / (length * length);

@@ -27,15 +27,13 @@
 
 use fearless_simd::Simd;
 
+use super::machine::has_native_arithmetic;
+
 /// Whether the lanes use the processor's own multiplication and addition. It is a constant in the dispatched
 /// function.
 #[inline(always)]
 pub(super) fn is_native<S: Simd>(simd: S) -> bool {
-    let level = simd.level();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    return !matches!(level, fearless_simd::Level::Sse2(_));
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    return !level.is_fallback();
+    has_native_arithmetic(simd.level())
 }
 
 /// Factor `2^27 + 1` that splits the 53 bits of a number into two halves.

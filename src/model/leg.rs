@@ -1,7 +1,7 @@
 //! Leg as a serial robot (paper, eq. 13-33, 53, 73-87); all six legs are alike.
 //!
 //! The paper writes the dynamics of a leg in joint coordinates, `D_i = M_i Qdd_i + C_i + G_i` (87), and
-//! transforms them to the platform by `J_Bv^-T`. The vector form below is the same force without joint
+//! transforms them to the platform by `J_Bv^-T` ([`super::joint_space`]). The vector form below is the same force without joint
 //! angles. The moment balance of the leg about A gives the transverse part of F, and the force balance of the
 //! rod gives the axial part.
 //!

@@ -57,6 +57,16 @@ pub fn at_most_256_bits(level: Level) -> Level {
     level
 }
 
+/// Whether lanes on this instruction set use the processor's own multiplication and addition. Others, of x86 processors without
+/// SSE4.2, repeat the bits of AVX2 in software.
+#[inline(always)]
+pub fn has_native_arithmetic(level: Level) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return !matches!(level, Level::Sse2(_));
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    return !level.is_fallback();
+}
+
 /// Mobile platform as a rigid body, in platform axes.
 #[derive(Clone, Debug)]
 pub struct Platform {
@@ -198,6 +208,14 @@ pub struct TransverseInertia {
     pub quadratic: f64,
     /// Reference length of the leg \[m\].
     pub reference_length: f64,
+}
+
+impl TransverseInertia {
+    /// Inertia at the length L of the leg \[kg m^2\].
+    pub fn at(&self, length: f64) -> f64 {
+        let change = length - self.reference_length;
+        self.constant + self.quadratic * change * change
+    }
 }
 
 /// Prismatic joint and its drive.

@@ -9,9 +9,11 @@
 //! | (1), task coordinates X | [`task`] |
 //! | (3)-(5), inverse geometric model | [`inverse_geometry`] |
 //! | (6)-(9), inverse Jacobian | [`inverse_jacobian`] |
-//! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
+//! | (2), (13)-(33), (37)-(45), (53), (55)-(87), one leg as a serial robot | [`leg`] without joint coordinates, [`joint_space`] with them |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
+//! | (10)-(12), (34)-(36), (46)-(52), (54) | no file: their print is not at hand. Maps of rates and velocity terms of the joints, which |
+//! | | their neighbours need: `tests/paper/joint_accelerations.rs` |
 //! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], |
 //! | | [`drive_loads`], [`transmission`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu`, |
 //! | | `pose_factorization`, `pose_lanes` |
@@ -46,6 +48,7 @@ pub mod forward_kinematics;
 mod fused;
 pub mod inverse_geometry;
 pub mod inverse_jacobian;
+pub mod joint_space;
 pub mod kinematic_state;
 mod lanes;
 mod lanes3;

@@ -1,6 +1,8 @@
 //! `hexad inverse-dynamics`: forces, lengths and their derivatives.
 
-use super::common::{Errors, MACHINES, Table, data, largest};
+use hexad::model::joint_space::{LegDynamics, joint_space};
+
+use super::common::{Errors, MACHINES, Table, data, largest, machine, motions};
 use super::{hexad_on_vectors, six_each, with_t};
 
 /// Of the largest force of the row.
@@ -64,6 +66,36 @@ fn the_exact_model_is_the_default() {
         .map(|options| hexad_on_vectors("inverse-dynamics", "motion_base", options).table().rows);
     assert_eq!(by_default, exact);
     assert_ne!(by_default, rigid, "the legs of this machine do spin");
+}
+
+/// The columns that were there stay as they are; the others are what `tests/paper` compares with the dense matrices.
+#[test]
+fn joint_space_adds_each_leg_as_a_serial_robot() {
+    let [plain, ours] = [&[][..], &["--joint-space"]]
+        .map(|options| hexad_on_vectors("inverse-dynamics", "scattered", options).table());
+    let of_joints =
+        |what: &str, joints: &[&str]| joints.iter().map(|joint| format!("{what}_{joint}")).collect();
+    let stems: [Vec<String>; 4] = [
+        of_joints("joint_mass", &["beta", "gamma", "length"]),
+        of_joints("joint_bias", &["beta", "gamma", "length"]),
+        of_joints("joint_accel", &["beta", "gamma"]),
+        of_joints("contact_force", &["x", "y", "z"]),
+    ];
+    let stems = stems.concat();
+    let columns = six_each(&stems.iter().map(String::as_str).collect::<Vec<_>>());
+    assert_eq!(ours.header, [plain.header.clone(), columns].concat());
+    let machine = machine("scattered");
+    for (index, motion) in motions("scattered").iter().enumerate() {
+        let width = plain.header.len();
+        assert_eq!(ours.rows[index][..width], plain.rows[index]);
+        let legs = joint_space(&machine, motion, &plain.legs(index, "force"));
+        let expected = legs.map(|LegDynamics { mass: m, bias: b, accel: a, contact_force: f }| {
+            [m.x, m.y, m.z, b.x, b.y, b.z, a.x, a.y, f.x, f.y, f.z]
+        });
+        for (k, stem) in stems.iter().enumerate() {
+            assert_eq!(ours.legs(index, stem), expected.map(|leg| leg[k]), "row {index}, {stem}");
+        }
+    }
 }
 
 /// The order of the columns does not matter, nor do other columns, blanks and the platform's line ends.

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::common::{Table, data};
+use super::common::{Legs, Table, data, machine};
 use super::{Ran, hexad, hexad_on_vectors, six_each, with_t};
 
 /// Forward kinematics of the first rows of a machine, some rows with other lengths.
@@ -78,4 +78,25 @@ fn singular_poses_have_no_forces() {
     assert!(ours.legs(0, "force").iter().all(|force| force.is_nan()));
     assert!(ours.legs(0, "length").iter().all(|length| length.is_finite()));
     assert!(ours.legs(1, "force").iter().all(|force| force.is_finite()));
+}
+
+/// A leg along the first axis of its universal joint has forces and no joint rates.
+#[test]
+fn legs_along_their_universal_axis_have_no_joint_coordinates() {
+    let machine = machine("motion_base");
+    let legs = Legs::of(&machine);
+    let at = legs.base[0] - legs.platform[0] + legs.universal_axis[0] * 1.5;
+    let columns = Table::read(&data("motion_base", "csv")).header[..19].join(",");
+    let row = format!("0.5,0,0,0,{:?},{:?},{:?}{}", at.x, at.y, at.z, ",0".repeat(12));
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("along.csv");
+    fs::write(&input, format!("{columns}\n{row}\n")).unwrap();
+    let ran = hexad("inverse-dynamics", &data("motion_base", "toml"), &input, &["--joint-space"]);
+    let message = "hexad: 1 of 1 rows are at singular poses, or have a leg along its universal axis, the first at t = 0.5\n";
+    assert_eq!((ran.code, &*ran.message), (Some(1), message));
+    let ours = ran.complete_table();
+    let [forces, bias, contact] =
+        ["force", "joint_bias_beta", "contact_force_x"].map(|stem| ours.legs(0, stem));
+    assert!(forces.iter().chain(&bias[1..]).chain(&contact[1..]).all(|value| value.is_finite()));
+    assert!(bias[0].is_nan() && contact[0].is_nan());
 }

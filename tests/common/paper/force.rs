@@ -51,12 +51,12 @@ fn end_load(machine: &Machine, leg: &Leg, form: &Form) -> Vector3<f64> {
 }
 
 /// `[ b~ ; U ] f`
-fn at_c(b: &Vector3<f64>, f: &Vector3<f64>) -> Vector6<f64> {
+pub fn at_c(b: &Vector3<f64>, f: &Vector3<f64>) -> Vector6<f64> {
     stack(&b.cross(f), f)
 }
 
 /// (88)-(93): the wrench about C that the platform's motion needs.
-fn platform_wrench(machine: &Machine, p: &Platform, form: &Form) -> Vector6<f64> {
+pub fn platform_wrench(machine: &Machine, p: &Platform, form: &Form) -> Vector6<f64> {
     let body = &machine.platform;
     let c = p.rotation * body.center_of_mass;
     let i_g = p.rotation * body.inertia * p.rotation.transpose();

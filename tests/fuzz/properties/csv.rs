@@ -43,7 +43,10 @@ pub fn hold(input: &[u8]) -> bool {
     };
     let motions = read(&trajectory_columns(), &[]);
     if let Some(table) = &motions {
-        check_output(table, &mut inverse_dynamics(&MACHINE, Fidelity::Exact, table).0, 1 + 4 * 6);
+        for (is_joint_space, stems) in [(false, 4), (true, 4 + 11)] {
+            let mut written = inverse_dynamics(&MACHINE, Fidelity::Exact, is_joint_space, table).0;
+            check_output(table, &mut written, 1 + stems * 6);
+        }
         check_trajectory(table, input);
     }
     let lengths = read(&length_columns(), &legs("length_rate"));

@@ -2,6 +2,7 @@
 //!
 //! Nothing is guessed: a fact that cannot be read is unknown, with the reason.
 
+use fearless_simd::Level;
 use serde::{Deserialize, Serialize};
 
 use self::permissions::RefusedRights;
@@ -9,6 +10,7 @@ use self::processors::LoopCpus;
 use super::files::HostFiles;
 use crate::config::deployment::Realtime;
 use crate::messages::location::{user_folder, user_id};
+use crate::model::machine::at_most_256_bits;
 use crate::realtime::clock_cost::ClockCost;
 use crate::realtime::setup::permissions::Permissions;
 
@@ -88,6 +90,7 @@ pub fn all(
         ("container", Ok(permissions::container(permissions))),
         ("throttling", kernel::throttling(host)),
         ("processors", Ok(processors::count(chosen))),
+        ("instruction set", Ok(processors::arithmetic(at_most_256_bits(Level::new())))),
         ("isolation", processors::isolation(host, chosen)),
         ("hyper-threading", processors::siblings(host, chosen)),
     ]);

@@ -1,8 +1,13 @@
 //! Facts about the processors of the real-time and the I/O thread: number, isolation, siblings, interrupts.
 
+use fearless_simd::Level;
+
 use super::kernel::boot_parameter;
 use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
+use crate::daemon::SLOW_ARITHMETIC;
+use crate::daemon::recorder::instruction_set;
+use crate::model::machine::has_native_arithmetic;
 use crate::realtime::setup::cpus::Cpus;
 
 /// Least number of processors: one for the real-time thread and one for the I/O thread.
@@ -40,6 +45,17 @@ fn set(host: &HostFiles, path: &str) -> Result<Cpus, String> {
         return Ok(Cpus::default());
     }
     Cpus::parse(&text).ok_or_else(|| format!("/{path} is {text:?} and no list of CPUs"))
+}
+
+/// Instruction set of the lanes.
+pub fn arithmetic(level: Level) -> Fact {
+    if has_native_arithmetic(level) {
+        return Fact::good(instruction_set(level));
+    }
+    Fact::fair(
+        SLOW_ARITHMETIC,
+        "use a processor with SSE4.2 or AVX2, or a rate at which `compute` of `hexad status` fits",
+    )
 }
 
 /// Number of processors.
@@ -159,6 +175,16 @@ pub mod tests {
         ] {
             let fact = count(&chosen(realtime, io, permitted));
             assert_eq!(fact.assessment, assessment, "{fact:?}");
+        }
+    }
+
+    #[test]
+    fn a_processor_without_sse4_2_is_slow() {
+        assert_eq!(arithmetic(Level::baseline()).assessment, Assessment::Fair);
+        let best = Level::new();
+        if let Some(sse4_2) = best.as_sse4_2() {
+            assert_eq!(arithmetic(Level::Sse4_2(sse4_2)), Fact::good("Sse4_2"));
+            assert_eq!(arithmetic(best).assessment, Assessment::Good);
         }
     }
 
