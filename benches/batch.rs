@@ -34,7 +34,8 @@ use peers::{BUILD, PEERS};
 use support::omissions::Omissions;
 use support::{Extent, Failure, exit_code};
 
-const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
+const LARGEST: usize = 10_000_000;
+const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, LARGEST];
 const QUICK_SIZES: usize = 3;
 
 /// Memory of a pose: its state, its motion and its forces, and the same in rows \[bytes\].
@@ -103,23 +104,22 @@ fn inverse_dynamics(model: &InverseDynamics, sizes: &[usize], states: &[TaskStat
     let titles = ["all threads", "one thread", "rows, all", "rows, one", "legs in lanes"];
     println!("{:>9}{}", "poses", titles.map(|title| format!("{title:>14}")).concat());
     for &size in sizes {
-        let repetitions = (motions.len() / size).min(1_000);
         let motions = motions.get(..size).unwrap_or_default();
         let rows = [&x, &x_rate, &x_accel].map(|rows| rows.get(..size).unwrap_or_default());
         let bar = ProgressBar::hidden();
         let mut forces_in = |threads: usize| {
-            ns_per_pose(size, repetitions, || {
+            ns_per_pose(size, || {
                 batch::forces(model, Fidelity::Exact, motions, &mut forces, threads, &bar);
             })
         };
         let [all, one] = [forces_in(0), forces_in(1)];
         let mut rows_in = |threads: usize| {
-            ns_per_pose(size, repetitions, || {
+            ns_per_pose(size, || {
                 batch::forces_of_rows(model, Fidelity::Exact, rows, &mut force_rows, threads);
             })
         };
         let [rows_all, rows_one] = [rows_in(0), rows_in(1)];
-        let legs_in_lanes = ns_per_pose(size, repetitions, || {
+        let legs_in_lanes = ns_per_pose(size, || {
             for (force, motion) in forces.iter_mut().zip(motions) {
                 *force = model.forces_of(Fidelity::Exact, motion);
             }
@@ -139,10 +139,10 @@ fn other_functions(machine: &Machine, motions: &[Motion]) {
     let lengths: Vec<_> = motions.iter().map(|motion| leg_lengths(machine, &motion.pose)).collect();
     let mut poses = vec![None; motions.len()];
     let mut in_lanes = |threads: usize| {
-        ns_per_pose(motions.len(), 1, || batch::poses(machine, &starts, &lengths, &mut poses, threads))
+        ns_per_pose(motions.len(), || batch::poses(machine, &starts, &lengths, &mut poses, threads))
     };
     let [all, one] = [in_lanes(0), in_lanes(1)];
-    let alone = ns_per_pose(motions.len(), 1, || {
+    let alone = ns_per_pose(motions.len(), || {
         for (pose, (start, lengths)) in poses.iter_mut().zip(starts.iter().zip(&lengths)) {
             let mut state = KinematicState::new(machine, *start);
             let outcome = refine(machine, &mut state, lengths).outcome;
@@ -157,10 +157,10 @@ fn other_functions(machine: &Machine, motions: &[Motion]) {
     let motions = motions.get(..REGRESSORS).unwrap_or_default();
     let mut found = vec![None; motions.len()];
     let mut in_threads = |threads: usize| {
-        ns_per_pose(motions.len(), 1, || batch::regressors(machine, motions, &mut found, threads))
+        ns_per_pose(motions.len(), || batch::regressors(machine, motions, &mut found, threads))
     };
     let [all, one] = [in_threads(0), in_threads(1)];
-    let alone = ns_per_pose(motions.len(), 1, || {
+    let alone = ns_per_pose(motions.len(), || {
         for (found, motion) in found.iter_mut().zip(motions) {
             *found = regressor(machine, motion);
         }
@@ -184,10 +184,15 @@ fn others(omissions: &mut Omissions) {
     }
 }
 
-fn ns_per_pose(poses: usize, repetitions: usize, mut evaluate: impl FnMut()) -> f64 {
-    let started = Instant::now();
-    (0..repetitions).for_each(|_| evaluate());
-    started.elapsed().as_secs_f64() * 1e9 / (repetitions * poses) as f64
+/// Shortest of several runs: other processes only make a run longer.
+fn ns_per_pose(poses: usize, mut evaluate: impl FnMut()) -> f64 {
+    let mut run_s = || {
+        let started = Instant::now();
+        evaluate();
+        started.elapsed().as_secs_f64()
+    };
+    let runs = (LARGEST / poses.max(1)).clamp(5, 20);
+    (0..runs).map(|_| run_s()).fold(f64::INFINITY, f64::min) * 1e9 / poses as f64
 }
 
 /// Memory that can be used without swapping \[bytes\].
