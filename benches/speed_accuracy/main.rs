@@ -114,8 +114,10 @@ fn compare(arguments: &ChartArguments) -> Result<(), Failure> {
     let begin = Instant::now();
     let mut omissions = Omissions::default();
     let scenes = scenes(&mut omissions)?;
-    let mut contenders = contenders(&scenes, &mut omissions);
     let rounds = if arguments.extent.is_quick() { QUICK_ROUNDS } else { ROUNDS };
+    parallel::measure(&charts, &scenes, rounds, &mut omissions)?;
+    parallel::draw(&charts)?;
+    let mut contenders = contenders(&scenes, &mut omissions);
     let style = ProgressStyle::with_template("{bar:40} {pos} of {len} rounds, {eta} left")?;
     let bar = ProgressBar::new(rounds as u64).with_style(style);
     for round in 0..rounds {
@@ -133,8 +135,6 @@ fn compare(arguments: &ChartArguments) -> Result<(), Failure> {
     println!("{} methods on scenes, {rounds} rounds, {:.0} s", rows.len(), begin.elapsed().as_secs_f64());
     write_csv(&charts, &rows)?;
     chart::draw(&charts)?;
-    parallel::measure(&charts, &scenes, rounds, &mut omissions)?;
-    parallel::draw(&charts)?;
     omissions.finish()
 }
 

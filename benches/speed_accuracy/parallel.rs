@@ -43,7 +43,10 @@ const SAMPLE_S: f64 = 0.3e-3;
 /// Poses that the threads share: 16 tasks of the batch form.
 const POSES: usize = 16 * 8192;
 
-/// Round trips between two threads in one sample.
+/// Poses and hand-overs, which last longer than a sample, are run once in so many rounds.
+const ROUNDS_PER_RUN: usize = 5;
+
+/// Round trips between two threads in one run.
 const ROUND_TRIPS: usize = 1000;
 
 /// Instruction sets by the legs that fit into a vector.
@@ -73,9 +76,10 @@ pub fn measure(
     let scene = scenes.iter().find(|scene| scene.name == SCENE).ok_or("no scene")?;
     let mut rows = legs_at_once(scene, rounds, omissions)?;
     let processors = available_parallelism()?.get();
-    rows.extend(poses_over_threads(scene, processors, rounds)?);
+    let runs = rounds.div_ceil(ROUNDS_PER_RUN);
+    rows.extend(poses_over_threads(scene, processors, runs)?);
     if processors > 1 {
-        rows.extend(hand_overs(rounds));
+        rows.extend(hand_overs(runs));
     } else {
         omissions.lacking("hand-over between threads", "it needs two processors");
     }
@@ -168,7 +172,7 @@ fn fastest(runs: usize, run: impl FnMut() -> f64) -> f64 {
     iter::repeat_with(run).take(runs).fold(f64::INFINITY, f64::min)
 }
 
-fn poses_over_threads(scene: &Scene, processors: usize, rounds: usize) -> Result<Vec<Row>, Failure> {
+fn poses_over_threads(scene: &Scene, processors: usize, runs: usize) -> Result<Vec<Row>, Failure> {
     let model = InverseDynamics::new(&scene.machine);
     let motions: Vec<Motion> = scene.motions.iter().cycle().take(POSES).copied().collect();
     let mut forces = vec![None; POSES];
@@ -176,7 +180,7 @@ fn poses_over_threads(scene: &Scene, processors: usize, rounds: usize) -> Result
         iter::successors(Some(1), |count| (*count < processors).then_some(processors.min(2 * count)));
     let rows = counts.map(|threads| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
-        let ns = fastest(rounds, || {
+        let ns = fastest(runs, || {
             let start = Instant::now();
             pool.install(|| {
                 batch::forces(&model, Fidelity::Exact, &motions, &mut forces, &ProgressBar::hidden());
@@ -189,8 +193,8 @@ fn poses_over_threads(scene: &Scene, processors: usize, rounds: usize) -> Result
 }
 
 /// One hand-over between two threads: half of a round trip, of threads that spin and of threads that sleep.
-fn hand_overs(rounds: usize) -> [Row; 2] {
-    let spinning = fastest(rounds, || {
+fn hand_overs(runs: usize) -> [Row; 2] {
+    let spinning = fastest(runs, || {
         let turn = AtomicUsize::new(0);
         let pass = |to| turn.store(to, Ordering::Release);
         let wait = |until| {
@@ -200,7 +204,7 @@ fn hand_overs(rounds: usize) -> [Row; 2] {
         };
         half_round_trip(pass, wait)
     });
-    let sleeping = fastest(rounds, || {
+    let sleeping = fastest(runs, || {
         let (turn, changed) = (Mutex::new(0), Condvar::new());
         let lock = || turn.lock().unwrap_or_else(PoisonError::into_inner);
         let pass = |to| {

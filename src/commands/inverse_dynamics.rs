@@ -68,7 +68,7 @@ fn fidelity_by_name() -> impl TypedValueParser<Value = Fidelity> {
 }
 
 /// Forces, lengths and their derivatives for a table with the columns of a trajectory, and whether all rows are solved. At a singular
-/// pose the forces are NaN. `is_joint_space`: the columns of [`JOINT_SPACE`] follow, NaN for a leg along its universal axis.
+/// pose the forces are NaN. `is_joint_space`: the columns of `JOINT_SPACE` follow, NaN for a leg along its universal axis.
 pub fn inverse_dynamics(
     machine: &Machine,
     fidelity: Fidelity,
