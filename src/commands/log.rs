@@ -48,7 +48,7 @@ static FORMAT: OnceLock<LogFormat> = OnceLock::new();
 pub fn install(format: LogFormat) {
     let (filter, warning) = filter(Targets::new().with_default(LevelFilter::INFO));
     registry().with(filter).with(output_layer(format)).init();
-    warning.inspect(|warning| tracing::warn!("{warning}"));
+    warn_of(warning);
 }
 
 /// The same beside a layer that receives the events of a library. The log leaves them out unless the filter is given.
@@ -56,7 +56,7 @@ pub fn install_beside(format: LogFormat, library: &str, layer: impl Layer<Regist
     let (filter, warning) =
         filter(Targets::new().with_default(LevelFilter::INFO).with_target(library, LevelFilter::OFF));
     registry().with(layer).with(output_layer(format).with_filter(filter)).init();
-    warning.inspect(|warning| tracing::warn!("{warning}"));
+    warn_of(warning);
 }
 
 /// The filter that the environment gives, else the default; and the reason why the given one is ignored.
@@ -69,6 +69,12 @@ fn filter(default: Targets) -> (Targets, Option<String>) {
     match text.parse::<Targets>() {
         Ok(filter) => (filter, None),
         Err(error) => (default, Some(ignored(error))),
+    }
+}
+
+fn warn_of(filter: Option<String>) {
+    if let Some(reason) = filter {
+        tracing::warn!("{reason}");
     }
 }
 

@@ -37,8 +37,9 @@ pub fn bridge_config(file: &NetworkFile) -> Result<Config, String> {
         "listen": { "endpoints": section.listen },
         "access_control": access_control(file),
     });
-    let tls = link(&mut root, &section.identity, "listen");
-    tls.map(|tls| tls["enable_mtls"] = true.into());
+    if let Some(tls) = link(&mut root, &section.identity, "listen") {
+        tls["enable_mtls"] = true.into();
+    }
     config(&root)
 }
 

@@ -102,7 +102,9 @@ impl<S: Subscriber> Layer<S> for AccessLog {
             _ => Some(Rejection::Connection(text.0)),
         };
         // It is never waited for: the thread is one of the library.
-        refusal.map(|refusal| self.send.try_send(refusal));
+        if let Some(refusal) = refusal {
+            let _ = self.send.try_send(refusal);
+        }
     }
 }
 

@@ -21,6 +21,8 @@ pub fn authority(folder: &Path, name: &str) -> Result<(), String> {
 
 /// A certificate for a name, signed by an authority: `FILE.pem` and `FILE.key`.
 pub fn certificate(folder: &Path, authority: &str, name: &str, file: &str) -> Result<(), String> {
-    let signed = format!("-CA {authority}.pem -CAkey {authority}.key -addext {ADDRESSES} -addext basicConstraints=CA:FALSE");
+    let signed = format!(
+        "-CA {authority}.pem -CAkey {authority}.key -addext {ADDRESSES} -addext basicConstraints=CA:FALSE"
+    );
     openssl(folder, &format!("{NEW_KEY} {signed} -subj /CN={name} -keyout {file}.key -out {file}.pem"))
 }

@@ -28,12 +28,12 @@ def connect(authority="ca", certificate=True):
     })))
 
 
-def ask(session, request, **fields):
+def ask(session, request, timeout=40.0, **fields):
     """Outcome of a request; None without an answer."""
     began = time.monotonic()
     payload = json.dumps(fields) if fields else None
     key = "hexad/%s/request/%s/%s" % (machine, name, request)
-    for reply in session.get(key, payload=payload, timeout=40.0):
+    for reply in session.get(key, payload=payload, timeout=timeout):
         answer = json.loads(reply.ok.payload.to_string())
         print(request, answer["result"], answer["text"], "%.1f ms" % (1e3 * (time.monotonic() - began)), flush=True)
         return answer
@@ -87,7 +87,7 @@ class Source:
 
     def run(self, seconds, rate=100, also=lambda: None):
         due, end = time.monotonic_ns(), time.monotonic_ns() + int(seconds * 1e9)
-        while due < end:
+        while due < end and time.monotonic_ns() < end:
             time.sleep(max(due - time.monotonic_ns(), 0) * 1e-9)
             self.publisher.put(self.pose(time.monotonic_ns()))
             also()
@@ -132,7 +132,7 @@ def moves():
     assert -1.1 * AMPLITUDE < min(heights) < -0.8 * AMPLITUDE, min(heights)
     answer = ask(session, "stop")
     assert answer["state"] == "standby", answer
-    assert ask(session, "park") is None, "not among the requests of the file"
+    assert ask(session, "park", timeout=2.0) is None, "not among the requests of the file"
     ages = sorted(newest.ages)
     print("age of a status: p50 %.2f, p99 %.2f ms of %d" % (*[ages[len(ages) * p // 100] * 1e-6 for p in (50, 99)], len(ages)))
     print("messages", newest.count, flush=True)
@@ -221,7 +221,9 @@ def denied():
     session = connect()
     other = Source(session, "hexad/%s/setpoint/studio" % machine)
     other.run(2.5)
-    answer = ask(session, "engage")
+    # Each reason is logged once a second.
+    time.sleep(1.5)
+    answer = ask(session, "engage", timeout=3.0)
     assert answer is None, answer
     key = "hexad/%s/request/studio/engage" % machine
     assert list(session.get(key, timeout=3.0)) == [], "with the name of another one"

@@ -73,7 +73,8 @@ fn hosts_with_certificates(test: &str) -> Result<Hosts, String> {
 
 /// Text of a machine file with a name and a deadline for setpoints.
 fn machine_file(name: &str) -> String {
-    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/motion_base.toml")).unwrap();
+    let text =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/motion_base.toml")).unwrap();
     text.replace("\"motion_base\"", &format!("\"{name}\"")) + TIMEOUTS + LIMIT
 }
 
