@@ -27,7 +27,7 @@ impl Host {
 /// The hosts, a folder with files, and the processes that run on the hosts.
 pub struct Hosts {
     name: String,
-    folder: tempfile::TempDir,
+    folder: PathBuf,
     processes: Vec<(&'static str, Child)>,
 }
 
@@ -40,7 +40,9 @@ impl Hosts {
     /// Hosts, or why there are none. `test` is a short name.
     pub fn new(test: &str) -> Result<Self, String> {
         let name = format!("hexad-{test}-{}", std::process::id());
-        let hosts = Self { name, folder: tempfile::tempdir().unwrap(), processes: vec![] };
+        let folder = std::env::temp_dir().join(&name);
+        fs::create_dir_all(&folder).unwrap();
+        let hosts = Self { name, folder, processes: vec![] };
         for host in Host::ALL {
             ip(&format!("netns add {}", hosts.namespace(host)))?;
             hosts.ip(host, "link set lo up")?;
@@ -72,14 +74,14 @@ impl Hosts {
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.folder.join(name)
     }
 
     /// A command on a host, in the folder.
     pub fn command(&self, host: Host, program: &Path, arguments: &str) -> Command {
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.namespace(host)]).arg(program).args(arguments.split(' '));
-        command.current_dir(self.folder.path()).env("RUST_BACKTRACE", "0");
+        command.current_dir(&self.folder).env("RUST_BACKTRACE", "0");
         command
     }
 
@@ -154,5 +156,6 @@ impl Drop for Hosts {
         for host in Host::ALL {
             let _ = ip(&format!("netns del {}", self.namespace(host)));
         }
+        let _ = fs::remove_dir_all(&self.folder);
     }
 }

@@ -65,7 +65,7 @@ pub enum Rejection {
     #[error("not permitted: {0}")]
     Denied(String),
     /// A remote side that was not admitted.
-    #[error("a connection is refused: {0}")]
+    #[error("the remote side is not admitted: {0}")]
     Connection(String),
 }
 

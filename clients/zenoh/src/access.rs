@@ -37,9 +37,7 @@ pub fn bridge_config(file: &NetworkFile) -> Result<Config, String> {
         "listen": { "endpoints": section.listen },
         "access_control": access_control(file),
     });
-    if let Some(tls) = link(&mut root, &section.identity, "listen") {
-        tls["enable_mtls"] = true.into();
-    }
+    link(&mut root, &section.identity, "listen");
     config(&root)
 }
 
@@ -57,8 +55,8 @@ fn config(root: &Value) -> Result<Config, String> {
     Config::from_json5(&root.to_string()).map_err(|error| error.to_string())
 }
 
-/// Adds what both sides have in common; returns the section on TLS.
-fn link<'a>(root: &'a mut Value, identity: &Identity, side: &str) -> Option<&'a mut Value> {
+/// Adds what both sides have in common.
+fn link(root: &mut Value, identity: &Identity, side: &str) {
     root["scouting"] = json!({ "multicast": { "enabled": false }, "gossip": { "enabled": false } });
     root["transport"] = json!({ "link": {
         "protocols": ["quic", "tls"],
@@ -68,10 +66,10 @@ fn link<'a>(root: &'a mut Value, identity: &Identity, side: &str) -> Option<&'a 
             "root_ca_certificate": identity.ca,
             format!("{side}_certificate"): identity.certificate,
             format!("{side}_private_key"): identity.key,
+            "enable_mtls": true,
             "close_link_on_expiration": true,
         },
     } });
-    root.pointer_mut("/transport/link/tls")
 }
 
 /// The access list.

@@ -19,7 +19,7 @@ OMEGA = 2.0 * math.pi * 0.5
 def connect(authority="ca", certificate=True):
     tls = {"root_ca_certificate": authority + ".pem"}
     if certificate:
-        tls.update(connect_certificate=file + ".pem", connect_private_key=file + ".key")
+        tls.update(enable_mtls=True, connect_certificate=file + ".pem", connect_private_key=file + ".key")
     return zenoh.open(zenoh.Config.from_json5(json.dumps({
         "mode": "client",
         "connect": {"endpoints": [endpoint], "timeout_ms": 4000, "exit_on_failure": True},

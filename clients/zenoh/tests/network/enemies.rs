@@ -59,6 +59,6 @@ fn a_certificate_permits_what_the_file_says_and_no_other_connects() {
         assert_eq!(cell.hosts.log("refused").contains("has no rights"), who == "stranger");
     }
     check_lines(&cell, "the file names no client with this certificate", Duration::from_secs(8));
-    check_lines(&cell, "a connection is refused", Duration::from_secs(16));
+    check_lines(&cell, "the remote side is not admitted", Duration::from_secs(16));
     assert_eq!(cell.bridge_lines("has ended"), 0, "{}", cell.hosts.ends());
 }

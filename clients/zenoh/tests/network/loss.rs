@@ -1,7 +1,6 @@
 //! A link that delays, reorders and loses packets, cuts of it, and steps of the source's clock.
 
 use std::f64::consts::PI;
-use std::path::Path;
 use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
