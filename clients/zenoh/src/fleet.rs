@@ -17,8 +17,11 @@ use zenoh::Wait;
 use crate::access::{client_config, request_key};
 use crate::network_file::{Identity, check_endpoint, check_name};
 
-/// Longest wait for a connection and for an answer that is given at once.
+/// Longest wait for a connection.
 const CONNECTION_LIMIT: Duration = Duration::from_secs(2);
+
+/// Longest wait for a status: longer than the bridge waits for the daemon.
+const STATUS_LIMIT: Duration = Duration::from_secs(4);
 
 /// Longest wait for the end of a stop.
 const STOP_LIMIT: Duration = Duration::from_secs(32);
@@ -54,7 +57,7 @@ impl FleetFile {
 
     /// Prints a line for each machine that answers, and on standard error one for each other. An error if none answers.
     pub fn print_status(&self, is_json: bool) -> Result<(), String> {
-        let outcomes = self.ask(&self.machine, "status", CONNECTION_LIMIT);
+        let outcomes = self.ask(&self.machine, "status", STATUS_LIMIT);
         report_failures(&outcomes);
         let answers: Vec<_> =
             outcomes.iter().filter_map(|(name, it)| Some((*name, it.as_ref().ok()?))).collect();

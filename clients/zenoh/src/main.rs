@@ -92,7 +92,6 @@ impl Command {
 }
 
 fn load(fleet: &Path) -> Result<FleetFile, Failure> {
-    log::install(LogFormat::Text);
     FleetFile::load(fleet).map_err(|error| (2, error))
 }
 

@@ -2,9 +2,11 @@
 
 import json
 import math
+import os
 import struct
 import sys
 import time
+import traceback
 
 import zenoh
 
@@ -14,6 +16,9 @@ file = sys.argv[5] if len(sys.argv) > 5 else name
 HOME_Z = 1.25
 AMPLITUDE = 0.05
 OMEGA = 2.0 * math.pi * 0.5
+
+
+zenoh.init_log_from_env_or("warn")
 
 
 def connect(authority="ca", certificate=True):
@@ -151,9 +156,10 @@ def motions():
     assert answer["result"] == "done", answer
     assert abs(newest.height() - 0.02) < 1e-3, newest.height()
     assert ask(session, "goto", target={"z_m": 9.0})["result"] == "invalid"
-    for _ in range(20):
-        assert ask(session, "jog", rate={"z_m_s": -0.02})["result"] == "accepted"
-        time.sleep(0.02)
+    for _ in range(40):
+        session.get("hexad/%s/request/%s/jog" % (machine, name), lambda reply: None,
+                    payload=json.dumps({"rate": {"z_m_s": -0.02}}), timeout=5.0)
+        time.sleep(0.05)
     assert newest.height() < 0.018, newest.height()
     # The token ends, and with it a motion on its way.
     session.get("hexad/%s/request/%s/goto" % (machine, name), lambda reply: None,
@@ -170,7 +176,9 @@ def motions():
 
 def follows(seconds=60.0):
     """Moves until it is ended."""
-    source = engaged(connect())
+    # A session ends with its object.
+    session = connect()
+    source = engaged(session)
     source.begin()
     source.run(seconds)
 
@@ -243,5 +251,14 @@ def refused():
                 print("refused", str(error)[:100], flush=True)
 
 
-globals()[function]()
-print("end of", function, flush=True)
+try:
+    globals()[function]()
+    print("end of", function, flush=True)
+    code = 0
+except BaseException:
+    traceback.print_exc()
+    code = 1
+sys.stdout.flush()
+sys.stderr.flush()
+# Callbacks of a session may keep the interpreter.
+os._exit(code)

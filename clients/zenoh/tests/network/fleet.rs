@@ -38,6 +38,7 @@ fn an_operator_finds_and_stops_all_machines() {
         cell.hosts.start(BRIDGES[k], cell.hosts.command(Host::Machine, Path::new(BRIDGE), &arguments));
     }
     fs::write(cell.hosts.path("fleet.toml"), fleet).unwrap();
+    DAEMONS.iter().for_each(|daemon| cell.hosts.wait_for(daemon, "running name"));
     BRIDGES.iter().for_each(|bridge| cell.hosts.wait_for(bridge, "the bridge is open"));
 
     let (out, errors, is_success) = operate(&cell, "status fleet.toml");

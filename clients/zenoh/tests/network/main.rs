@@ -24,13 +24,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hosts::{Host, Hosts};
 use stalls::Watchdog;
 
 /// Pauses of the host up to this length are no reason to fail: measurements may be 50 ms old.
 const MAX_STALL: Duration = Duration::from_millis(20);
+
+/// Longest wait for a client.
+const PATIENCE: Duration = Duration::from_secs(90);
 
 /// One loop at a time: they are real-time.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -105,6 +108,7 @@ impl Cell {
         fs::write(hosts.path("m-network.toml"), network_file(&hosts.machine(), endpoint)).unwrap();
         hosts.start("daemon", hosts.hexad("run --config m.toml"));
         hosts.start("plant", hosts.hexad("plant --config m.toml"));
+        hosts.wait_for("daemon", "standby");
         hosts.start("bridge", hosts.command(Host::Machine, Path::new(BRIDGE), "run m-network.toml m.toml"));
         hosts.wait_for("bridge", "the bridge is open");
     }
@@ -120,8 +124,9 @@ impl Cell {
 
     /// Waits until a client has printed a text, without a fault. False if the host pauses too long for that.
     fn reaches(&mut self, client: &'static str, text: &str) -> bool {
-        let watchdog = Watchdog::start();
+        let (watchdog, began) = (Watchdog::start(), Instant::now());
         while !self.hosts.log(client).contains(text) && self.hosts.is_running(client) {
+            assert!(began.elapsed() < PATIENCE, "{text:?} of {client}\n{}", self.hosts.ends());
             sleep(Duration::from_millis(20));
         }
         let has_fault = self.hosts.log("daemon").contains("ERROR fault");
@@ -130,6 +135,7 @@ impl Cell {
         }
         let gap = watchdog.largest();
         assert!(gap > MAX_STALL, "{gap:?}\n{}", self.hosts.ends());
+        eprintln!("{}", self.hosts.ends());
         not_run::not_run(&format!("the host pauses processes for {gap:?}"));
         false
     }
