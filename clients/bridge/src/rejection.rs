@@ -64,6 +64,9 @@ pub enum Rejection {
     /// The list of the file does not permit it.
     #[error("not permitted: {0}")]
     Denied(String),
+    /// A certificate of the authority that the file does not name.
+    #[error("not permitted: the file names no client with this certificate")]
+    UnnamedCertificate,
     /// A remote side that was not admitted.
     #[error("the remote side is not admitted: {0}")]
     Connection(String),

@@ -62,7 +62,7 @@ impl AccessLog {
             return None;
         }
         if text.contains("did not match any configured ACL subject") {
-            return Some(Rejection::Denied("the file names no client with this certificate".into()));
+            return Some(Rejection::UnnamedCertificate);
         }
         let subject = text.split_once(" on Interface(");
         if let Some((session, rest)) = subject {

@@ -59,8 +59,6 @@ impl<'a> Bridge<'a> {
                 "the machine runs in simulated time, which no other host shares: realtime.release".into()
             );
         }
-        // The threads of Zenoh inherit the priority: with an ordinary one, a busy host delays setpoints by many milliseconds.
-        prepare_thread(config);
         let session = zenoh::open(bridge_config(file)?).wait().map_err(|error| format!("Zenoh: {error}"))?;
         Self::serve(file, config, &bus, session, refusals)
     }
@@ -100,6 +98,9 @@ impl<'a> Bridge<'a> {
 
     /// Relays until a signal.
     pub fn run(mut self, stop: &Stop) {
+        // Only this thread, which does little in each pass. A flood would keep threads of Zenoh busy, and if all real-time threads together
+        // are, the kernel pauses them, the control loop with them.
+        prepare_thread(self.config);
         info!("the bridge is open");
         while !stop.is_requested() {
             self.relay();

@@ -115,9 +115,15 @@ impl Cell {
 
     /// Starts a function of `client.py` above ordinary processes of a busy host. `who` is the name, and the file of the certificate.
     fn start_client(&mut self, function: &'static str, endpoint: &str, who: &str) {
+        self.start_client_with("-f 20", function, endpoint, who);
+    }
+
+    /// The same with a scheduling policy, as arguments of `chrt`.
+    fn start_client_with(&mut self, policy: &str, function: &'static str, endpoint: &str, who: &str) {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/network/client.py");
         let (python, machine) = (self.python.join("bin/python"), self.hosts.machine());
-        let arguments = format!("-f 20 {} {script} {function} {machine} {endpoint} {who}", python.display());
+        let arguments =
+            format!("{policy} {} {script} {function} {machine} {endpoint} {who}", python.display());
         let command = self.hosts.command(Host::Remote, Path::new("chrt"), &arguments);
         self.hosts.start(function, command);
     }
