@@ -49,7 +49,8 @@ struct Cell {
 impl Cell {
     /// A cell, unless the test cannot run here. `sections` are of the machine file.
     fn open(test: &str, sections: &str) -> Option<Self> {
-        let parts = Hosts::new(&format!("ros2-{test}")).map_err(|why| format!("network namespaces (root, ip): {why}"));
+        let parts = Hosts::new(&format!("ros2-{test}"))
+            .map_err(|why| format!("network namespaces (root, ip): {why}"));
         let parts = parts.and_then(|hosts| Ok(Self { hosts, python: rclpy()? }));
         let mut cell = match parts {
             Ok(cell) => cell,
