@@ -93,11 +93,7 @@ impl Motions {
 
     fn begin(&mut self, request: &str, query: Query) {
         match self.line(request, &query) {
-            Ok(line) => {
-                if let Err((query, answer)) = self.send(&line, query) {
-                    reply(&query, &answer);
-                }
-            }
+            Ok(line) => self.send(&line, query),
             Err(text) => {
                 info!(remote = self.client, "{request}: {text}");
                 reply(&query, &AnswerLine { request: request.into(), ..AnswerLine::invalid(text) });
@@ -120,19 +116,18 @@ impl Motions {
     }
 
     /// Sends a line over the connection, which begins with the first motion.
-    fn send(&mut self, line: &RequestLine, query: Query) -> Result<(), (Query, AnswerLine)> {
+    fn send(&mut self, line: &RequestLine, query: Query) {
         let link = match &mut self.link {
             Some(link) => link,
             none => match connect(&self.machine) {
                 Ok(connection) => none.insert((connection, VecDeque::new())),
-                Err(error) => return Err((query, failure(&line.request, &error))),
+                Err(error) => return reply(&query, &failure(&line.request, &error)),
             },
         };
         link.1.push_back(query);
         if let Err(error) = link.0.send(line) {
             self.end(&format!("the daemon has ended the connection: {error}"));
         }
-        Ok(())
     }
 
     /// Passes on an answer, if there is one. Answers come in the order of the requests.
