@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hexad::control::signals::state::Request;
 use hexad::operator::protocol::{AnswerLine, RequestResult};
@@ -19,6 +19,9 @@ use crate::network_file::{Identity, check_endpoint, check_name};
 
 /// Longest wait for a connection.
 const CONNECTION_LIMIT: Duration = Duration::from_secs(2);
+
+/// Time between two attempts.
+const RETRY_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Longest wait for a status: longer than the bridge waits for the daemon.
 const STATUS_LIMIT: Duration = Duration::from_secs(4);
@@ -136,11 +139,19 @@ impl FleetFile {
         let config = client_config(endpoint, &self.identity, CONNECTION_LIMIT.as_millis() as u64)?;
         let session =
             zenoh::open(config).wait().map_err(|error| format!("no connection to {endpoint}: {error}"))?;
-        let answers = session.get(request_key(machine, &self.name, request)).timeout(limit).wait();
-        let answers = answers.map_err(|error| error.to_string())?;
+        let key = request_key(machine, &self.name, request);
         let silent =
             || format!("{endpoint} does not answer: does its network file name a client \"{}\"?", self.name);
-        let reply = answers.recv().map_err(|_| silent())?;
+        let connected = Instant::now();
+        let reply = loop {
+            let answers = session.get(&key).timeout(limit).wait().map_err(|error| error.to_string())?;
+            match answers.recv() {
+                Ok(reply) => break reply,
+                // Just after the connection the request may precede what the bridge has declared.
+                Err(_) if connected.elapsed() < CONNECTION_LIMIT => thread::sleep(RETRY_INTERVAL),
+                Err(_) => return Err(silent()),
+            }
+        };
         let sample = reply.into_result().map_err(|_| silent())?;
         let answer: AnswerLine =
             serde_json::from_slice(&sample.payload().to_bytes()).map_err(|error| error.to_string())?;

@@ -25,12 +25,15 @@ def connect(authority="ca", certificate=True):
     tls = {"root_ca_certificate": authority + ".pem"}
     if certificate:
         tls.update(enable_mtls=True, connect_certificate=file + ".pem", connect_private_key=file + ".key")
-    return zenoh.open(zenoh.Config.from_json5(json.dumps({
+    session = zenoh.open(zenoh.Config.from_json5(json.dumps({
         "mode": "client",
         "connect": {"endpoints": [endpoint], "timeout_ms": 4000, "exit_on_failure": True},
         "scouting": {"multicast": {"enabled": False}},
         "transport": {"link": {"tx": {"lease": 2000}, "tls": tls}},
     })))
+    # What the bridge has declared arrives after the connection.
+    time.sleep(0.5)
+    return session
 
 
 def ask(session, request, timeout=40.0, **fields):
