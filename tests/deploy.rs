@@ -7,9 +7,10 @@ use crate::common;
 use std::fs;
 use std::process::Command;
 
-const UNITS: [&str; 2] = [
+const UNITS: [&str; 3] = [
     concat!(env!("CARGO_MANIFEST_DIR"), "/deploy/hexad@.service"),
     concat!(env!("CARGO_MANIFEST_DIR"), "/deploy/hexad-driver@.service"),
+    concat!(env!("CARGO_MANIFEST_DIR"), "/deploy/hexad-zenoh@.service"),
 ];
 
 /// Standard output and standard error of `systemd-analyze` with these arguments, and its exit code; none where it is
@@ -29,8 +30,8 @@ fn systemd_analyze(arguments: &[&str]) -> Option<(String, Option<i32>)> {
 #[test]
 fn verify_prints_nothing() {
     // It returns 0 for some mistakes, such as a misspelt Type, but never silently.
-    let [daemon, driver] = UNITS;
-    let Some((text, code)) = systemd_analyze(&["verify", daemon, driver]) else { return };
+    let [daemon, driver, bridge] = UNITS;
+    let Some((text, code)) = systemd_analyze(&["verify", daemon, driver, bridge]) else { return };
     assert_eq!(text, "");
     assert_eq!(code, Some(0));
 }
@@ -38,8 +39,8 @@ fn verify_prints_nothing() {
 #[test]
 fn the_sandbox_is_tight() {
     // Exposure in tenths, 0 is best. What keeps it from zero are shared memory and real time themselves; a driver needs more
-    // of the host.
-    for (unit, threshold) in UNITS.into_iter().zip(["--threshold=12", "--threshold=16"]) {
+    // of the host, and a bridge a network.
+    for (unit, threshold) in UNITS.into_iter().zip(["--threshold=12", "--threshold=16", "--threshold=23"]) {
         let Some((text, code)) = systemd_analyze(&["security", "--offline=true", threshold, unit]) else {
             return;
         };

@@ -14,7 +14,7 @@ use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt;
-use tracing_subscriber::{Layer, fmt, registry};
+use tracing_subscriber::{Layer, Registry, fmt, registry};
 
 /// Identifier of the journal's entries, independent of the program that started the process.
 const IDENTIFIER: &str = "hexad";
@@ -46,11 +46,42 @@ static FORMAT: OnceLock<LogFormat> = OnceLock::new();
 
 /// Installs the log of this process, with the filter of `HEXAD_LOG` or `RUST_LOG`, as `debug` or `info,hexad::daemon=debug`.
 pub fn install(format: LogFormat) {
-    let _ = FORMAT.set(format);
+    let (filter, warning) = filter(Targets::new().with_default(LevelFilter::INFO));
+    registry().with(filter).with(output_layer(format)).init();
+    warn_of(warning);
+}
+
+/// The same beside a layer that receives the events of a library. The log leaves them out unless the filter is given.
+pub fn install_beside(format: LogFormat, library: &str, layer: impl Layer<Registry> + Send + Sync) {
+    let (filter, warning) =
+        filter(Targets::new().with_default(LevelFilter::INFO).with_target(library, LevelFilter::OFF));
+    registry().with(layer).with(output_layer(format).with_filter(filter)).init();
+    warn_of(warning);
+}
+
+/// The filter that the environment gives, else the default; and the reason why the given one is ignored.
+fn filter(default: Targets) -> (Targets, Option<String>) {
     let given = FILTER_VARIABLES.iter().find_map(|name| Some((name, env::var(name).ok()?)));
-    let parsed = given.as_ref().map(|(_, text)| text.parse::<Targets>());
-    let default = || Targets::new().with_default(LevelFilter::INFO);
-    let filter = parsed.as_ref().and_then(|parsed| parsed.as_ref().ok()).cloned().unwrap_or_else(default);
+    let Some((name, text)) = given else { return (default, None) };
+    let ignored = |error| {
+        format!("{name} = {text:?} is ignored: {error}; must be a level, or as info,hexad::daemon=debug")
+    };
+    match text.parse::<Targets>() {
+        Ok(filter) => (filter, None),
+        Err(error) => (default, Some(ignored(error))),
+    }
+}
+
+fn warn_of(filter: Option<String>) {
+    if let Some(reason) = filter {
+        tracing::warn!("{reason}");
+    }
+}
+
+fn output_layer<S: Subscriber + for<'a> LookupSpan<'a>>(
+    format: LogFormat,
+) -> Box<dyn Layer<S> + Send + Sync> {
+    let _ = FORMAT.set(format);
     let is_json = format == LogFormat::Json;
     let journal =
         (is_journal() && !is_json).then(tracing_journald::layer).and_then(Result::ok).map(|journal| {
@@ -61,17 +92,9 @@ pub fn install(format: LogFormat) {
         });
     // The journal adds its own time stamps.
     match journal {
-        Some(journal) => registry().with(filter).with(journal).init(),
-        None if is_json => {
-            let json = fmt::layer().json().flatten_event(true).with_writer(io::stderr);
-            registry().with(filter).with(json).init();
-        }
-        None => registry().with(filter).with(text_layer()).init(),
-    }
-    if let (Some((name, text)), Some(Err(error))) = (given, parsed) {
-        tracing::warn!(
-            "{name} = {text:?} is ignored: {error}; must be a level, or as info,hexad::daemon=debug"
-        );
+        Some(journal) => Box::new(journal),
+        None if is_json => Box::new(fmt::layer().json().flatten_event(true).with_writer(io::stderr)),
+        None => Box::new(text_layer()),
     }
 }
 

@@ -8,15 +8,16 @@ use hexad::config::Config;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{MeasuredMessage, StatusMessage, Subscriber};
 use hexad::realtime::stop_request::Stop;
+use hexad_bridge::rejection::{Rejection, RejectionLog};
+use hexad_bridge::setpoint_relay::SetpointRelay;
 use ros2_client::{Gid, Publisher, Subscription};
 use tracing::info;
 
+use crate::conversion::{pose_setpoint, trajectory_setpoint};
 use crate::network_file::{NetworkFile, SetpointTopic};
 use crate::node::{BUFFER, BridgeNode, NodeNames};
-use crate::rejection::{Rejection, RejectionLog};
 use crate::requests::serve;
 use crate::ros_messages as ros;
-use crate::setpoint_relay::SetpointRelay;
 use crate::telemetry::{PlatformMotion, Telemetry};
 
 /// Period of the loop.
@@ -24,7 +25,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 
 /// Bridge of one machine.
 pub struct Bridge<'a> {
-    relay: SetpointRelay<'a>,
+    relay: SetpointRelay<'a, Gid>,
     telemetry: Telemetry<'a>,
     poses: Option<Subscription<ros::PoseStamped>>,
     trajectories: Option<Subscription<ros::MultiDofTrajectory>>,
@@ -85,7 +86,7 @@ impl<'a> Bridge<'a> {
             serve(config.name.clone(), request, node.trigger(request.name())?, node.names.clone());
         }
         Ok(Self {
-            relay: SetpointRelay::new(config, base.clone()),
+            relay: SetpointRelay::new(config),
             telemetry: Telemetry { config, base, platform, clock_offset_ns: 0 },
             poses: poses.transpose()?,
             trajectories: trajectories.transpose()?,
@@ -116,11 +117,15 @@ impl<'a> Bridge<'a> {
     }
 
     fn receive(&mut self) {
-        let Self { relay, poses, trajectories, rejections, node, .. } = self;
-        let names = &node.names;
-        drain(poses, rejections, names, |message, id, arrival_ns| relay.add_pose(message, id, arrival_ns));
+        let Self { relay, telemetry, poses, trajectories, rejections, node, .. } = self;
+        let (names, home, base) = (&node.names, &telemetry.config.machine.home, telemetry.base.as_str());
+        drain(poses, rejections, names, |message, id, arrival_ns| {
+            let stamp_ns = message.header.stamp.nanoseconds();
+            relay.add(&id, stamp_ns, arrival_ns, || pose_setpoint(message, base, home))
+        });
         drain(trajectories, rejections, names, |message, id, arrival_ns| {
-            relay.add_trajectory(message, id, arrival_ns)
+            let stamp_ns = message.header.stamp.nanoseconds();
+            relay.add(&id, stamp_ns, arrival_ns, || trajectory_setpoint(message, base, home))
         });
     }
 }

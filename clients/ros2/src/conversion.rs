@@ -1,23 +1,52 @@
 //! Motions from and to messages of ROS 2, whose quantities are all in the frame `base`.
 
+use hexad::control::signals::inputs::SetpointKind;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use hexad::model::task::{TaskState, task_coordinates};
+use hexad_bridge::rejection::Rejection;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
-use crate::rejection::Rejection;
 use crate::ros_messages as ros;
 
 /// Largest difference of a quaternion's norm from 1: many times the rounding of numbers in single precision.
 const MAX_NORM_ERROR: f64 = 1e-3;
 
+/// A sample of a motion: kind, X, and time after the stamp \[ns\]. `frame` is the name of the frame of all setpoints.
+pub fn pose_setpoint(
+    message: &ros::PoseStamped,
+    frame: &str,
+    near: &[f64; 6],
+) -> Result<(SetpointKind, TaskState, i64), Rejection> {
+    check_frame(&message.header, frame)?;
+    Ok((SetpointKind::Pose, TaskState::at_rest(pose_x(&message.pose, near)?), 0))
+}
+
+/// A point of a trajectory, likewise.
+pub fn trajectory_setpoint(
+    message: &ros::MultiDofTrajectory,
+    frame: &str,
+    near: &[f64; 6],
+) -> Result<(SetpointKind, TaskState, i64), Rejection> {
+    check_frame(&message.header, frame)?;
+    let (task, ahead_ns) = trajectory_point(message, near)?;
+    Ok((SetpointKind::Motion, task, ahead_ns))
+}
+
+fn check_frame(header: &ros::Header, frame: &str) -> Result<(), Rejection> {
+    if header.frame_id == frame {
+        return Ok(());
+    }
+    Err(Rejection::Frame(header.frame_id.chars().take(64).collect(), frame.into()))
+}
+
 /// X of a pose, with the angles nearest to the angles of `near`.
-pub fn pose_x(message: &ros::Pose, near: &[f64; 6]) -> Result<[f64; 6], Rejection> {
+fn pose_x(message: &ros::Pose, near: &[f64; 6]) -> Result<[f64; 6], Rejection> {
     let ros::Point { x, y, z } = message.position;
     Ok(task_coordinates(&pose(Vector3::new(x, y, z), &message.orientation)?, near))
 }
 
 /// X, X' and X'' of the only point of a trajectory, and its time after the stamp \[ns\].
-pub fn trajectory_point(
+fn trajectory_point(
     message: &ros::MultiDofTrajectory,
     near: &[f64; 6],
 ) -> Result<(TaskState, i64), Rejection> {
@@ -34,9 +63,6 @@ pub fn trajectory_point(
         acceleration: Acceleration { angular, linear },
     };
     let task = TaskState::of_motion(&motion, near).ok_or(Rejection::AngleRates)?;
-    if !task.is_finite() {
-        return Err(Rejection::NotFinite);
-    }
     Ok((task, point.time_from_start.nanoseconds()))
 }
 
@@ -134,7 +160,8 @@ mod tests {
         bad.points[0].velocities.clear();
         assert!(matches!(trajectory_point(&bad, &X), Err(Rejection::Derivatives)));
         bad = good;
-        bad.points[0].accelerations[0].angular.x = f64::INFINITY;
-        assert!(matches!(trajectory_point(&bad, &X), Err(Rejection::NotFinite)));
+        bad.header.frame_id = "map".into();
+        let other = Err(Rejection::Frame("map".into(), "base".into()));
+        assert_eq!(trajectory_setpoint(&bad, "base", &X), other);
     }
 }

@@ -4,17 +4,14 @@
 //! | --- | --- |
 //! | [`network_file`] | the file of the networks |
 //! | [`ros_messages`], [`conversion`], [`telemetry`] | messages of ROS 2, motions in them, measured motion as messages |
-//! | [`rejection`], [`setpoint_relay`] | reasons to reject a setpoint, setpoints of remote sources on the topic of the machine |
 //! | [`node`], [`requests`], [`bridge`] | the node with its topics and services, requests, the loop |
 
 mod bridge;
 mod conversion;
 mod network_file;
 mod node;
-mod rejection;
 mod requests;
 mod ros_messages;
-mod setpoint_relay;
 mod telemetry;
 
 use std::fs;

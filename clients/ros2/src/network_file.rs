@@ -3,8 +3,10 @@
 use std::net::IpAddr;
 
 use hexad::control::signals::state::Request;
+use hexad_bridge::requests::{STOPS, requests_of_names};
 use nix::ifaddrs::getifaddrs;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 /// File of one machine.
 #[derive(Clone, Debug, Deserialize)]
@@ -14,6 +16,9 @@ pub struct NetworkFile {
     pub name: String,
     /// Connection to ROS 2.
     pub ros2: Ros2Section,
+    /// Connection to Zenoh, which is for another bridge.
+    #[serde(default, rename = "zenoh")]
+    _zenoh: IgnoredAny,
 }
 
 /// Section `[ros2]`.
@@ -65,7 +70,7 @@ fn default_rate_hz() -> f64 {
 }
 
 fn stops() -> Vec<String> {
-    [Request::Stop, Request::Off, Request::Estop].map(|request| request.name().into()).into()
+    STOPS.map(|request| request.name().into()).into()
 }
 
 /// Largest DDS domain with all ports below the range that Linux gives to other connections.
@@ -116,12 +121,7 @@ impl Ros2Section {
 
     /// The requests that are accepted.
     pub fn allowed_requests(&self) -> Result<Vec<Request>, String> {
-        let of_name = |name: &String| Request::ALL.into_iter().find(|request| request.name() == name);
-        let unknown = |name: &String| {
-            let names = Request::ALL.map(Request::name).join(", ");
-            format!("requests: \"{name}\" must be one of {names}")
-        };
-        self.requests.iter().map(|name| of_name(name).ok_or_else(|| unknown(name))).collect()
+        requests_of_names(&self.requests)
     }
 
     /// IPv4 addresses of the interface.
@@ -145,8 +145,9 @@ mod tests {
 
     #[test]
     fn nothing_but_stops_is_accepted_by_default() {
-        let section = NetworkFile::parse(TRUSTED, "m-network.toml").unwrap().ros2;
-        assert_eq!(section.allowed_requests().unwrap(), [Request::Stop, Request::Off, Request::Estop]);
+        let beside = format!("{TRUSTED}[zenoh]\nlisten = []\n");
+        let section = NetworkFile::parse(&beside, "m-network.toml").unwrap().ros2;
+        assert_eq!(section.allowed_requests().unwrap(), STOPS);
         assert!(section.setpoints.is_empty());
         assert!(section.addresses().unwrap().iter().all(IpAddr::is_loopback));
     }

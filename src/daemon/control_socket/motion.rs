@@ -149,7 +149,8 @@ impl Server<'_> {
         connection.waits_for_motion = true;
         let job = Job::new(self.status.loaded().clone(), order, time_ns, received, sent);
         self.motions.next = Some((job, running));
-        info!(user = %peer.user(), process = peer.process_id, "request: {}", line.request);
+        let remote = line.remote.as_deref();
+        info!(user = %peer.user(), process = peer.process_id, remote, "request: {}", line.request);
         is_read && replaced.is_none_or(|replaced| connection.send(&replaced))
     }
 

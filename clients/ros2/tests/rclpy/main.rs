@@ -3,6 +3,8 @@
 
 #[path = "../../../../tests/common/hexad_process.rs"]
 mod hexad_process;
+#[path = "../../../../tests/common/hosts.rs"]
+#[allow(dead_code, reason = "shared with the tests of other bridges")]
 mod hosts;
 #[path = "../../../../tests/common/not_run.rs"]
 #[allow(dead_code, reason = "shared with the tests of hexad")]
@@ -47,7 +49,8 @@ struct Cell {
 impl Cell {
     /// A cell, unless the test cannot run here. `sections` are of the machine file.
     fn open(test: &str, sections: &str) -> Option<Self> {
-        let parts = Hosts::new(test).map_err(|why| format!("network namespaces (root, ip): {why}"));
+        let parts = Hosts::new(&format!("ros2-{test}"))
+            .map_err(|why| format!("network namespaces (root, ip): {why}"));
         let parts = parts.and_then(|hosts| Ok(Self { hosts, python: rclpy()? }));
         let mut cell = match parts {
             Ok(cell) => cell,
@@ -65,14 +68,15 @@ impl Cell {
         let timeouts = "\n[timeouts]\nsetpoint_ms = 400\nmeasured_ms = 50\nallow_unstable_age = true\n";
         fs::write(hosts.path("m.toml"), machine + timeouts + sections).unwrap();
         let network = format!(
-            "name = \"{}\"\n[ros2]\ntrusted_network = true\ninterface = \"ros0\"\nsetpoints = [\"pose\", \"trajectory\"]\n\
+            "name = \"{}\"\n[ros2]\ntrusted_network = true\ninterface = \"net0\"\nsetpoints = [\"pose\", \"trajectory\"]\n\
              requests = [\"engage\", \"clear\", \"stop\", \"estop\"]\n",
             hosts.machine()
         );
         fs::write(hosts.path("m-network.toml"), network).unwrap();
         hosts.start("daemon", hosts.hexad("run --config m.toml"));
         hosts.start("plant", hosts.hexad("plant --config m.toml"));
-        hosts.start("bridge", hosts.bridge());
+        let bridge = Path::new(env!("CARGO_BIN_EXE_hexad-ros2"));
+        hosts.start("bridge", hosts.command(Host::Machine, bridge, "m-network.toml m.toml"));
         hosts.wait_for("bridge", "the bridge is open");
         Some(cell)
     }

@@ -1,4 +1,4 @@
-//! Two hosts for each test: one with the machine and the bridge, one with rclpy, and a cable between them.
+//! Hosts for each test of a bridge: one with the machine and the bridge, two with remote programs, and cables between them.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::hexad_process;
+use super::hexad_process;
 
 /// Longest wait for what has to happen.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -27,7 +27,7 @@ impl Host {
 /// The hosts, a folder with files, and the processes that run on the hosts.
 pub struct Hosts {
     name: String,
-    folder: tempfile::TempDir,
+    folder: PathBuf,
     processes: Vec<(&'static str, Child)>,
 }
 
@@ -37,15 +37,17 @@ fn ip(arguments: &str) -> Result<(), String> {
 }
 
 impl Hosts {
-    /// Hosts, or why there are none.
+    /// Hosts, or why there are none. `test` is a short name.
     pub fn new(test: &str) -> Result<Self, String> {
-        let name = format!("hexad-ros2-{test}-{}", std::process::id());
-        let hosts = Self { name, folder: tempfile::tempdir().unwrap(), processes: vec![] };
+        let name = format!("hexad-{test}-{}", std::process::id());
+        let folder = std::env::temp_dir().join(&name);
+        fs::create_dir_all(&folder).unwrap();
+        let hosts = Self { name, folder, processes: vec![] };
         for host in Host::ALL {
             ip(&format!("netns add {}", hosts.namespace(host)))?;
             hosts.ip(host, "link set lo up")?;
         }
-        for (port, remote, network) in [("ros0", Host::Remote, 1), ("ros1", Host::Stranger, 2)] {
+        for (port, remote, network) in [("net0", Host::Remote, 1), ("net1", Host::Stranger, 2)] {
             let there = hosts.namespace(remote);
             hosts.ip(Host::Machine, &format!("link add {port} type veth peer name eth0 netns {there}"))?;
             for (host, port, number) in [(Host::Machine, port, 1), (remote, "eth0", 2)] {
@@ -57,7 +59,8 @@ impl Hosts {
         Ok(hosts)
     }
 
-    fn namespace(&self, host: Host) -> String {
+    /// Network namespace of a host.
+    pub fn namespace(&self, host: Host) -> String {
         format!("{}-{host:?}", self.name)
     }
 
@@ -71,20 +74,15 @@ impl Hosts {
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.folder.join(name)
     }
 
     /// A command on a host, in the folder.
     pub fn command(&self, host: Host, program: &Path, arguments: &str) -> Command {
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &self.namespace(host)]).arg(program).args(arguments.split(' '));
-        command.current_dir(self.folder.path()).env("RUST_BACKTRACE", "0");
+        command.current_dir(&self.folder).env("RUST_BACKTRACE", "0");
         command
-    }
-
-    /// The command `hexad-ros2`.
-    pub fn bridge(&self) -> Command {
-        self.command(Host::Machine, Path::new(env!("CARGO_BIN_EXE_hexad-ros2")), "m-network.toml m.toml")
     }
 
     /// The command `hexad`.
@@ -92,8 +90,12 @@ impl Hosts {
         hexad_process::hexad(|program, role| self.command(Host::Machine, program, role), arguments)
     }
 
-    /// Starts a process whose output is the file `name`.
+    /// Starts a process whose output is the file `name`. It takes the place of one that has this name.
     pub fn start(&mut self, name: &'static str, mut command: Command) {
+        if let Some(place) = self.processes.iter().position(|(started, _)| *started == name) {
+            self.kill(name);
+            self.processes.swap_remove(place);
+        }
         let log = File::create(self.path(name)).unwrap();
         let child =
             command.stdout(log.try_clone().unwrap()).stderr(log).stdin(Stdio::null()).spawn().unwrap();
@@ -102,6 +104,11 @@ impl Hosts {
 
     fn child(&mut self, name: &str) -> &mut Child {
         &mut self.processes.iter_mut().find(|(started, _)| *started == name).unwrap().1
+    }
+
+    /// Number of a process.
+    pub fn process_id(&mut self, name: &str) -> u32 {
+        self.child(name).id()
     }
 
     /// Ends a process at once.
@@ -149,5 +156,6 @@ impl Drop for Hosts {
         for host in Host::ALL {
             let _ = ip(&format!("netns del {}", self.namespace(host)));
         }
+        let _ = fs::remove_dir_all(&self.folder);
     }
 }

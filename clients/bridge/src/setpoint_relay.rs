@@ -2,6 +2,7 @@
 //! whether it counts, and how the platform reacts to its end.
 
 use std::collections::BTreeMap;
+use std::fmt::Debug;
 
 use hexad::config::Config;
 use hexad::control::parameters::ViolationPolicy;
@@ -9,12 +10,9 @@ use hexad::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad::messages::source_clock::SourceClock;
 use hexad::messages::{Bus, PortError, Publisher, SetpointMessage};
 use hexad::model::task::TaskState;
-use ros2_client::Gid;
 use tracing::info;
 
-use crate::conversion::{pose_x, trajectory_point};
 use crate::rejection::Rejection;
-use crate::ros_messages as ros;
 
 /// Number of sources whose clocks are kept. The one that was silent for longest is forgotten.
 const MAX_SOURCES: usize = 16;
@@ -25,23 +23,21 @@ const MAX_RATE_HZ: u64 = 2_000;
 /// Messages that may arrive at once, after an interruption.
 const BURST: u64 = 64;
 
-/// Relay of one machine.
-pub struct SetpointRelay<'a> {
+/// Relay of one machine. `Id` identifies one life of a source.
+pub struct SetpointRelay<'a, Id> {
     config: &'a Config,
-    /// Name of the frame of all setpoints.
-    frame: String,
     /// Silence after which a source has ended, and largest age of a message \[ns\].
     timeout_ns: u64,
-    sources: BTreeMap<Gid, Source>,
+    sources: BTreeMap<Id, Source>,
     /// Source that is followed.
-    followed: Option<Gid>,
+    followed: Option<Id>,
     /// Newest setpoint that is not published yet.
     newest: Option<Setpoint>,
     /// Publisher of the life of the followed source.
     publisher: Option<(Publisher<SetpointMessage>, Bus)>,
 }
 
-/// A publisher of ROS 2.
+/// Clock and rate of a source.
 struct Source {
     clock: SourceClock,
     /// Arrival of its last accepted message \[ns\].
@@ -50,86 +46,49 @@ struct Source {
     due_ns: u64,
 }
 
-impl<'a> SetpointRelay<'a> {
-    /// Relay without a source. `frame` is the name of the frame of all setpoints.
-    pub fn new(config: &'a Config, frame: String) -> Self {
+impl<'a, Id: Ord + Clone + Debug> SetpointRelay<'a, Id> {
+    /// Relay without a source.
+    pub fn new(config: &'a Config) -> Self {
         let timeout_ns = (config.deployment.timeouts.setpoint_s * 1e9) as u64;
-        Self {
-            config,
-            frame,
-            timeout_ns,
-            sources: BTreeMap::new(),
-            followed: None,
-            newest: None,
-            publisher: None,
-        }
+        Self { config, timeout_ns, sources: BTreeMap::new(), followed: None, newest: None, publisher: None }
     }
 
-    /// Accepts a pose as a sample of a motion.
-    pub fn add_pose(
+    /// Accepts a message with this stamp of the source's clock. `convert` returns the kind, the motion, and how long after the
+    /// stamp it holds \[ns\].
+    pub fn add(
         &mut self,
-        message: &ros::PoseStamped,
-        id: Gid,
-        arrival_ns: u64,
-    ) -> Result<(), Rejection> {
-        let config = self.config;
-        self.add(&message.header, id, arrival_ns, || {
-            if config.deployment.setpoint.on_violation != ViolationPolicy::Limit {
-                return Err(Rejection::Policy);
-            }
-            let x = pose_x(&message.pose, &config.machine.home)?;
-            Ok((SetpointKind::Pose, TaskState::at_rest(x), 0))
-        })
-    }
-
-    /// Accepts the point of a trajectory.
-    pub fn add_trajectory(
-        &mut self,
-        message: &ros::MultiDofTrajectory,
-        id: Gid,
-        arrival_ns: u64,
-    ) -> Result<(), Rejection> {
-        let (home, timeout_ns) = (&self.config.machine.home, self.timeout_ns);
-        self.add(&message.header, id, arrival_ns, || {
-            let (task, ahead_ns) = trajectory_point(message, home)?;
-            if !(0..=timeout_ns as i64).contains(&ahead_ns) {
-                return Err(Rejection::Ahead(ahead_ns as f64 * 1e-9, timeout_ns as f64 * 1e-6));
-            }
-            Ok((SetpointKind::Motion, task, ahead_ns))
-        })
-    }
-
-    /// Accepts a message with a header, which holds this long after its stamp \[ns\].
-    fn add(
-        &mut self,
-        header: &ros::Header,
-        id: Gid,
+        id: &Id,
+        stamp_ns: i64,
         arrival_ns: u64,
         convert: impl FnOnce() -> Result<(SetpointKind, TaskState, i64), Rejection>,
     ) -> Result<(), Rejection> {
         self.end_silent(arrival_ns);
-        if let Some(followed) = self.followed.filter(|followed| *followed != id) {
+        if let Some(followed) = self.followed.as_ref().filter(|followed| *followed != id) {
             return Err(Rejection::OtherSource(format!("{followed:?}")));
         }
-        let timeout_ns = self.timeout_ns;
-        let is_in_frame = header.frame_id == self.frame;
+        let (timeout_ns, policy) = (self.timeout_ns, self.config.deployment.setpoint.on_violation);
         let source = self.source(id, arrival_ns);
         let (due_ns, interval_ns) = (source.due_ns.max(arrival_ns), 1_000_000_000 / MAX_RATE_HZ);
         if due_ns - arrival_ns >= BURST * interval_ns {
             return Err(Rejection::Flood(MAX_RATE_HZ));
         }
         source.due_ns = due_ns + interval_ns;
-        if !is_in_frame {
-            return Err(Rejection::Frame(header.frame_id.chars().take(64).collect(), self.frame.clone()));
-        }
         let (kind, task, ahead_ns) = convert()?;
-        let instant_ns =
-            source.clock.instant_ns(header.stamp.nanoseconds(), arrival_ns as i64, timeout_ns as i64);
+        if !task.is_finite() {
+            return Err(Rejection::NotFinite);
+        }
+        if kind == SetpointKind::Pose && policy != ViolationPolicy::Limit {
+            return Err(Rejection::Policy);
+        }
+        if !(0..=timeout_ns as i64).contains(&ahead_ns) {
+            return Err(Rejection::Ahead(ahead_ns as f64 * 1e-9, timeout_ns as f64 * 1e-6));
+        }
+        let instant_ns = source.clock.instant_ns(stamp_ns, arrival_ns as i64, timeout_ns as i64);
         let instant_ns = instant_ns.ok_or(Rejection::Late(timeout_ns as f64 * 1e-6))?;
         source.seen_ns = arrival_ns;
         let time_ns = instant_ns.saturating_add(ahead_ns) as u64;
         self.newest = Some(Setpoint { kind, ..Setpoint::motion(time_ns, task) });
-        if self.followed.replace(id).is_none() {
+        if self.followed.replace(id.clone()).is_none() {
             info!("follows the source {id:?}");
         }
         Ok(())
@@ -151,8 +110,8 @@ impl<'a> SetpointRelay<'a> {
 
     /// Ends the life of the publisher if its source is silent.
     fn end_silent(&mut self, now_ns: u64) {
-        let Some(followed) = self.followed else { return };
-        let source = self.sources.get(&followed);
+        let Some(followed) = &self.followed else { return };
+        let source = self.sources.get(followed);
         if source.is_none_or(|source| now_ns.saturating_sub(source.seen_ns) > self.timeout_ns) {
             info!("the source {followed:?} has ended");
             (self.followed, self.newest, self.publisher) = (None, None, None);
@@ -160,13 +119,13 @@ impl<'a> SetpointRelay<'a> {
     }
 
     /// The source with this identity.
-    fn source(&mut self, id: Gid, now_ns: u64) -> &mut Source {
-        if self.sources.len() >= MAX_SOURCES && !self.sources.contains_key(&id) {
+    fn source(&mut self, id: &Id, now_ns: u64) -> &mut Source {
+        if self.sources.len() >= MAX_SOURCES && !self.sources.contains_key(id) {
             let silent = self.sources.iter().min_by_key(|(_, source)| source.seen_ns);
-            silent.map(|(id, _)| *id).and_then(|id| self.sources.remove(&id));
+            silent.map(|(id, _)| id.clone()).and_then(|id| self.sources.remove(&id));
         }
         let new = || Source { clock: SourceClock::default(), seen_ns: now_ns, due_ns: 0 };
-        self.sources.entry(id).or_insert_with(new)
+        self.sources.entry(id.clone()).or_insert_with(new)
     }
 }
 
@@ -175,29 +134,23 @@ mod tests {
     use super::*;
 
     const MS: u64 = 1_000_000;
-    const SOURCE: [u8; 16] = [7; 16];
 
-    fn config() -> Config {
+    fn config(policy: &str) -> Config {
         let text = include_str!("../../../config/motion_base.toml");
-        let sections = "\n[setpoint]\non_violation = \"limit\"\n[timeouts]\nsetpoint_ms = 100\n";
+        let sections = format!("\n[setpoint]\non_violation = \"{policy}\"\n[timeouts]\nsetpoint_ms = 100\n");
         Config::parse(&format!("{text}{sections}"), "a test").unwrap()
     }
 
-    /// Pose at home with a stamp of the source's clock \[ns\].
-    fn pose(stamp_ns: u64) -> ros::PoseStamped {
-        let stamp = ros::Time::from_nanoseconds(stamp_ns as i64);
-        let header = ros::Header { stamp, frame_id: "base".into() };
-        let mut message = ros::PoseStamped { header, ..Default::default() };
-        (message.pose.position.z, message.pose.orientation.w) = (1.25, 1.0);
-        message
+    fn home(config: &Config) -> Result<(SetpointKind, TaskState, i64), Rejection> {
+        Ok((SetpointKind::Pose, TaskState::at_rest(config.machine.home), 0))
     }
 
-    /// Rejections of messages, each with its source, stamp and arrival \[ms\].
+    /// Rejections of poses at home, each with its source, stamp of the source's clock and arrival \[ms\].
     fn rejections(messages: &[(u8, u64, u64)]) -> Vec<Option<Rejection>> {
-        let config = config();
-        let mut relay = SetpointRelay::new(&config, "base".into());
+        let config = config("limit");
+        let mut relay = SetpointRelay::new(&config);
         let add = |(id, stamp_ms, arrival_ms): &(u8, u64, u64)| {
-            relay.add_pose(&pose(stamp_ms * MS), [*id; 16].into(), arrival_ms * MS).err()
+            relay.add(id, (stamp_ms * MS) as i64, arrival_ms * MS, || home(&config)).err()
         };
         messages.iter().map(add).collect()
     }
@@ -220,18 +173,28 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_and_another_frame_are_named() {
-        let config = config();
-        let mut relay = SetpointRelay::new(&config, "base".into());
-        let mut add = |message: &ros::PoseStamped, k| relay.add_pose(message, SOURCE.into(), 9000 * MS + k);
+    fn a_flood_is_thinned_and_what_no_setpoint_may_be_is_named() {
+        let limit = config("limit");
+        let mut relay = SetpointRelay::new(&limit);
+        let mut add = |k, stamp_ns| relay.add(&1, stamp_ns, 9000 * MS + k, || home(&limit));
         // 10,000 messages a second, for one second.
-        let found: Vec<_> = (0..10_000).map(|k| add(&pose(1000 * MS + k * MS / 10), k * MS / 10)).collect();
+        let found: Vec<_> = (0..10_000).map(|k| add(k * MS / 10, (k * MS / 10) as i64)).collect();
         let accepted = found.iter().filter(|found| found.is_ok()).count() as u64;
         assert!((MAX_RATE_HZ..MAX_RATE_HZ + BURST + 1).contains(&accepted), "{accepted}");
         assert!(found.iter().rev().take(10).any(Result::is_ok), "none is silent");
         assert!(found.contains(&Err(Rejection::Flood(MAX_RATE_HZ))));
-        let mut message = pose(2000 * MS);
-        message.header.frame_id = "map".into();
-        assert_eq!(add(&message, 2000 * MS), Err(Rejection::Frame("map".into(), "base".into())));
+
+        let stop = config("stop");
+        let mut relay = SetpointRelay::new(&stop);
+        let mut add = |kind, task, ahead_ns| relay.add(&1, 1, 9000 * MS, || Ok((kind, task, ahead_ns)));
+        let task = TaskState::at_rest(stop.machine.home);
+        assert_eq!(add(SetpointKind::Pose, task, 0), Err(Rejection::Policy));
+        let later = (101 * MS) as i64;
+        assert_eq!(add(SetpointKind::Motion, task, later), Err(Rejection::Ahead(0.101, 100.0)));
+        assert_eq!(
+            add(SetpointKind::Motion, TaskState::at_rest([f64::NAN; 6]), 0),
+            Err(Rejection::NotFinite)
+        );
+        assert_eq!(add(SetpointKind::Motion, task, 0), Ok(()));
     }
 }
