@@ -100,7 +100,7 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
     assert_eq!(keys, ["control.position_bandwidth_hz"]);
     refused(
         "[control]\non_setpoint_lost = \"coast\"",
-        &["control.on_setpoint_lost = \"coast\": must be one of \"fault\", \"park\""],
+        &["control.on_setpoint_lost = \"coast\": must be one of \"fault\", \"stop\", \"park\""],
     );
     refused(
         "[limits]\nautonomous_scale = 1.1",

@@ -106,8 +106,8 @@ fn what_is_refused_is_refused_with_the_reason() {
     let offered = Offered::start(&machine, 0.01);
     daemon.says("standby: setpoint too far from the platform");
     let words = "engage was refused: setpoint too far from the platform: the difference between setpoint and platform is 5 times \
-         the tolerance control.engage_*; start the setpoints where the platform stands, or set setpoint.approach = true: the \
-         platform then moves to them (10.000 mm and 0.000 mrad away)";
+         the tolerance control.engage_*; start the setpoints where the platform stands, or set setpoint.approach = true (under control engage \
+         is enough): the platform then moves to them (10.000 mm and 0.000 mrad away)";
     is_refused(&machine, "engage", &[], words);
     let waits = Hexad::start(&machine, "engage", &["--wait"]);
     let asked =

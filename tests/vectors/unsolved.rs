@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use nalgebra::{Rotation3, Vector3};
+
 use super::common::{Legs, Table, data, machine};
 use super::{Ran, hexad, hexad_on_vectors, six_each, with_t};
 
@@ -85,9 +87,12 @@ fn singular_poses_have_no_forces() {
 fn legs_along_their_universal_axis_have_no_joint_coordinates() {
     let machine = machine("motion_base");
     let legs = Legs::of(&machine);
-    let at = legs.base[0] - legs.platform[0] + legs.universal_axis[0] * 1.5;
+    // Turned, as all legs would be in one plane otherwise.
+    let alpha = 0.4;
+    let arm = Rotation3::from_axis_angle(&Vector3::x_axis(), alpha) * legs.platform[0];
+    let at = legs.base[0] - arm + legs.universal_axis[0] * 1.5;
     let columns = Table::read(&data("motion_base", "csv")).header[..19].join(",");
-    let row = format!("0.5,0,0,0,{:?},{:?},{:?}{}", at.x, at.y, at.z, ",0".repeat(12));
+    let row = format!("0.5,{alpha},0,0,{:?},{:?},{:?}{}", at.x, at.y, at.z, ",0".repeat(12));
     let folder = tempfile::tempdir().unwrap();
     let input = folder.path().join("along.csv");
     fs::write(&input, format!("{columns}\n{row}\n")).unwrap();

@@ -148,8 +148,8 @@ codes! {
     SetpointTooFar = 4, None,
         ratio("the difference between setpoint and platform", "the tolerance control.engage_*"),
         "setpoint too far from the platform",
-        "start the setpoints where the platform stands, or set setpoint.approach = true: the platform then moves to them; a platform \
-        that holds its pose under control moves to them after engage";
+        "start the setpoints where the platform stands, or set setpoint.approach = true (under control engage is enough): the platform \
+        then moves to them";
     /// The setpoint source ended while its setpoint was at rest.
     SetpointEnded = 5, None,
         absolute("age", "s", "exceeds", "timeouts.setpoint_ms"),

@@ -42,7 +42,7 @@ const BRIDGE: &str = env!("CARGO_BIN_EXE_hexad-zenoh");
 
 /// Sections of machine files. The processors are shared with clients and tests: pauses of the host are no subject here.
 const TIMEOUTS: &str = "\n[timeouts]\nsetpoint_ms = 400\nmeasured_ms = 50\nallow_unstable_age = true\n";
-const LIMIT: &str = "[setpoint]\non_violation = \"limit\"\n";
+const LIMIT: &str = "[setpoint]\non_violation = \"limit\"\non_return = \"hold\"\n";
 
 /// What the clients may do.
 const CLIENTS: &str = "[zenoh.client.studio]\nsetpoints = true\nmotions = true\nrequests = [\"engage\", \"clear\"]\n\
