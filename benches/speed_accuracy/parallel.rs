@@ -18,7 +18,6 @@ use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::rigid::Motion;
 use hexad::output::charts::LineStyle;
 use indicatif::ProgressBar;
-use rayon::ThreadPoolBuilder;
 use serde::Deserialize;
 
 use super::AGREEMENT;
@@ -77,7 +76,7 @@ pub fn measure(
     let mut rows = legs_at_once(scene, rounds, omissions)?;
     let processors = available_parallelism()?.get();
     let runs = rounds.div_ceil(ROUNDS_PER_RUN);
-    rows.extend(poses_over_threads(scene, processors, runs)?);
+    rows.extend(poses_over_threads(scene, processors, runs));
     if processors > 1 {
         rows.extend(hand_overs(runs));
     } else {
@@ -172,22 +171,19 @@ fn fastest(runs: usize, run: impl FnMut() -> f64) -> f64 {
     iter::repeat_with(run).take(runs).fold(f64::INFINITY, f64::min)
 }
 
-fn poses_over_threads(scene: &Scene, processors: usize, runs: usize) -> Result<Vec<Row>, Failure> {
+fn poses_over_threads(scene: &Scene, processors: usize, runs: usize) -> Vec<Row> {
     let model = InverseDynamics::new(&scene.machine);
     let motions: Vec<Motion> = scene.motions.iter().cycle().take(POSES).copied().collect();
     let mut forces = vec![None; POSES];
     let counts =
         iter::successors(Some(1), |count| (*count < processors).then_some(processors.min(2 * count)));
     let rows = counts.map(|threads| {
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
         let ns = fastest(runs, || {
             let start = Instant::now();
-            pool.install(|| {
-                batch::forces(&model, Fidelity::Exact, &motions, &mut forces, &ProgressBar::hidden());
-            });
+            batch::forces(&model, Fidelity::Exact, &motions, &mut forces, threads, &ProgressBar::hidden());
             start.elapsed().as_secs_f64() * 1e9 / POSES as f64
         });
-        Ok(Row::new("poses", "", threads, ns))
+        Row::new("poses", "", threads, ns)
     });
     rows.collect()
 }
