@@ -2,10 +2,12 @@
 //!
 //! | module | computes |
 //! | --- | --- |
+//! | [`machine`] | the machine that a bridge connects |
 //! | [`rejection`] | reasons to reject a message, and their log |
 //! | [`setpoint_relay`] | setpoints of remote sources on the topic of the machine |
 //! | [`requests`] | operators' requests from a network |
 
+pub mod machine;
 pub mod rejection;
 pub mod requests;
 pub mod setpoint_relay;

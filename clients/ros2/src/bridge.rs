@@ -8,6 +8,7 @@ use hexad::config::Config;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{MeasuredMessage, StatusMessage, Subscriber};
 use hexad::realtime::stop_request::Stop;
+use hexad_bridge::machine::join;
 use hexad_bridge::rejection::{Rejection, RejectionLog};
 use hexad_bridge::setpoint_relay::SetpointRelay;
 use ros2_client::{Gid, Publisher, Subscription};
@@ -52,18 +53,7 @@ impl<'a> Bridge<'a> {
     /// Joins the machine and ROS 2. An error says what prevents it.
     pub fn open(file: &NetworkFile, config: &'a Config) -> Result<Self, String> {
         let section = &file.ros2;
-        if file.name != config.name {
-            return Err(format!(
-                "name = \"{}\" must be the name in the machine file, \"{}\"",
-                file.name, config.name
-            ));
-        }
-        let bus = config.join().map_err(|error| error.to_string())?;
-        if bus.is_simulated() {
-            return Err(
-                "the machine runs in simulated time, which no other host shares: realtime.release".into()
-            );
-        }
+        let bus = join(&file.name, config)?;
         let mut node = BridgeNode::join(section, section.addresses()?)?;
         let accepts = |topic| section.setpoints.contains(&topic);
         let poses = accepts(SetpointTopic::Pose).then(|| node.subscription("setpoint_pose"));

@@ -8,6 +8,7 @@ use hexad::config::Config;
 use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::stop_request::Stop;
+use hexad_bridge::machine::join;
 use hexad_bridge::rejection::{Rejection, RejectionLog};
 use hexad_bridge::setpoint_relay::SetpointRelay;
 use tracing::info;
@@ -47,18 +48,7 @@ impl<'a> Bridge<'a> {
         config: &'a Config,
         refusals: Receiver<Rejection>,
     ) -> Result<Self, String> {
-        if file.name != config.name {
-            return Err(format!(
-                "name = \"{}\" must be the name in the machine file, \"{}\"",
-                file.name, config.name
-            ));
-        }
-        let bus = config.join().map_err(|error| error.to_string())?;
-        if bus.is_simulated() {
-            return Err(
-                "the machine runs in simulated time, which no other host shares: realtime.release".into()
-            );
-        }
+        let bus = join(&file.name, config)?;
         let session = zenoh::open(bridge_config(file)?).wait().map_err(|error| format!("Zenoh: {error}"))?;
         Self::serve(file, config, &bus, session, refusals)
     }

@@ -1,6 +1,7 @@
 //! Forward kinematics of many poses: eight at once, one per lane.
 //!
-//! Newton's method of [`super::newton`], but with a new factorization in each step, as lanes differ in where an old one would do. A lane for which the trusted region does not prove the outcome is solved alone by [`refine`].
+//! Newton's method of [`super::newton`], but with a new factorization in each step, as lanes differ in where an old one would do.
+//! A lane for which the trusted region does not prove the outcome is solved alone by [`refine`].
 
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix3, Vector3};
