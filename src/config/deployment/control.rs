@@ -173,7 +173,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     control
 }
 
-/// Goal of a platform that lost its setpoint, and the time for which it holds its pose before.
+/// Goal of a platform that lost its setpoint, and the time for which it holds its pose before that.
 fn setpoint_loss(section: &mut SectionReader) -> (AfterStop, f64) {
     let goals = [("fault", AfterStop::Fault), ("stop", AfterStop::Standby), ("park", AfterStop::Park)];
     let goal = section.choice_or("on_setpoint_lost", AfterStop::Fault, &goals);

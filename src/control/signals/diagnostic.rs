@@ -427,6 +427,11 @@ impl DiagnosticCode {
         self as u32 >= 100
     }
 
+    /// Whether a platform under control holds its pose for this reason: without setpoints, or with distant ones after that.
+    pub fn holds_pose(self) -> bool {
+        self == Self::HoldingPose || self == Self::SetpointTooFar
+    }
+
     /// Reads the number of a message.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::ALL.iter().copied().find(|code| *code as u32 == number)

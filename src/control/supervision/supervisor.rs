@@ -26,11 +26,6 @@ pub struct SupervisorState {
     pub after: AfterStop,
 }
 
-/// Whether a platform that was following holds its pose for this reason.
-fn ends_in_hold(code: DiagnosticCode) -> bool {
-    code == DiagnosticCode::HoldingPose || code == DiagnosticCode::SetpointTooFar
-}
-
 /// Findings of one cycle that decide the next state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Findings {
@@ -64,7 +59,7 @@ pub(in crate::control) struct Supervisor {
 impl Supervisor {
     /// Whether the platform holds its pose, because setpoints were lost.
     pub fn holds_pose(&self) -> bool {
-        self.current.state == State::Engaging && ends_in_hold(self.current.diagnostic.code)
+        self.current.state == State::Engaging && self.current.diagnostic.code.holds_pose()
     }
 
     /// Request of an input, if it was not answered before. Each request is carried out once.
@@ -205,7 +200,7 @@ fn following(
     if let Err(diagnostic) = findings.tracking {
         let after = match diagnostic.code {
             // The platform holds its pose and engages again from there.
-            code if ends_in_hold(code) => {
+            code if code.holds_pose() => {
                 let resumes = code == DiagnosticCode::SetpointTooFar && request == Some(Request::Engage);
                 let diagnostic = if resumes { Diagnostic::default() } else { diagnostic };
                 (current, has_ended) =

@@ -28,9 +28,6 @@ use crate::realtime::clock::{Grid, sleep_until};
 mod error;
 mod observation;
 
-/// Under control: the platform holds its pose, without setpoints or with distant ones.
-const HOLDS: [DiagnosticCode; 2] = [DiagnosticCode::HoldingPose, DiagnosticCode::SetpointTooFar];
-
 /// Time within which the daemon must follow a published target \[ns\].
 const FOLLOWING_LIMIT_NS: u64 = 3_000_000_000;
 
@@ -54,7 +51,7 @@ pub fn held_x(config: &Config) -> Result<Option<[f64; 6]>, String> {
         return Err(TargetError::OtherSource(other).to_string());
     }
     // Without setpoints, `on_violation = "limit"` holds the reference.
-    let is_holding = HOLDS.iter().any(|code| seen.code == *code as u32);
+    let is_holding = DiagnosticCode::from_number(seen.code).is_some_and(DiagnosticCode::holds_pose);
     let held = if is_holding { seen.reference } else { seen.target };
     let (Some(held), Some(reference)) = (held, seen.reference) else {
         let state = seen.state.name();
