@@ -6,7 +6,7 @@
 use serde_json::{Value, json};
 use zenoh::Config;
 
-use crate::network_file::{Client, Identity, NetworkFile};
+use crate::network_file::{Client, Identity, NetworkFile, listening_endpoint};
 
 /// Silence after which a side counts as lost \[ms\].
 const LEASE_MS: u64 = 2_000;
@@ -32,9 +32,10 @@ pub fn client_token(machine: &str, client: &str) -> String {
 /// Configuration of the session that listens.
 pub fn bridge_config(file: &NetworkFile) -> Result<Config, String> {
     let section = &file.zenoh;
+    let endpoints: Vec<_> = section.listen.iter().map(|endpoint| listening_endpoint(endpoint)).collect();
     let mut root = json!({
         "mode": "router",
-        "listen": { "endpoints": section.listen },
+        "listen": { "endpoints": endpoints },
         "access_control": access_control(file),
     });
     link(&mut root, &section.identity, "listen");

@@ -86,6 +86,10 @@ const MAX_RATE_HZ: f64 = 1000.0;
 /// What an endpoint over QUIC needs, so that samples are datagrams and nothing waits for a lost one.
 const DATAGRAMS: &str = "?mixed_rel=1";
 
+/// One stream for all priorities: of several, one may deliver a request before another has delivered the declaration of its key, and Zenoh
+/// then ends the request without an answer.
+const ONE_STREAM: &str = ";multistream=0";
+
 impl NetworkFile {
     /// Reads and checks a text; error texts name it `place`.
     pub fn parse(text: &str, place: &Path) -> Result<Self, String> {
@@ -128,9 +132,17 @@ pub fn check_endpoint(endpoint: &str) -> Result<(), String> {
         Some(("quic", address)) if !address.contains(DATAGRAMS) => Err(format!(
             "\"{endpoint}\" must end with {DATAGRAMS}: otherwise all messages wait for a lost one"
         )),
+        Some((_, address)) if address.contains("multistream") => Err(format!(
+            "\"{endpoint}\" must not set multistream: a bridge has one stream, so that requests stay in order"
+        )),
         Some(("quic" | "tls", _)) => Ok(()),
         _ => Err(format!("\"{endpoint}\" must begin with quic/ or tls/: other links carry no certificates")),
     }
+}
+
+/// The endpoint at which a session listens.
+pub fn listening_endpoint(endpoint: &str) -> String {
+    endpoint.replace(DATAGRAMS, &format!("{DATAGRAMS}{ONE_STREAM}"))
 }
 
 /// Checks a name that is a part of keys.
@@ -200,6 +212,7 @@ mod tests {
             ("[]", "", "m-network.toml: zenoh.listen: is missing"),
             ("[\"tcp/10.0.0.1:7447\"]", "", "\"tcp/10.0.0.1:7447\" must begin with quic/ or tls/"),
             ("[\"quic/10.0.0.1:7447#mixed_rel=1\"]", "", "must end with ?mixed_rel=1"),
+            ("[\"quic/10.0.0.1:7447?mixed_rel=1;multistream=1\"]", "", "must not set multistream"),
             (LISTEN, "pose_hz = nan", "zenoh.pose_hz = NaN"),
             (LISTEN, "[zenoh.client.\"a/*\"]", "zenoh.client.\"a/*\": a name must consist of"),
             (

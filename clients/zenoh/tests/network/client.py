@@ -21,7 +21,7 @@ OMEGA = 2.0 * math.pi * 0.5
 zenoh.init_log_from_env_or("warn")
 
 
-def connect(authority="ca", certificate=True):
+def connect(authority="ca", certificate=True, settle=0.5):
     tls = {"root_ca_certificate": authority + ".pem"}
     if certificate:
         tls.update(enable_mtls=True, connect_certificate=file + ".pem", connect_private_key=file + ".key")
@@ -32,7 +32,7 @@ def connect(authority="ca", certificate=True):
         "transport": {"link": {"tx": {"lease": 2000}, "tls": tls}},
     })))
     # What the bridge has declared arrives after the connection.
-    time.sleep(0.5)
+    time.sleep(settle)
     return session
 
 
@@ -145,6 +145,17 @@ def moves():
     print("age of a status: p50 %.2f, p99 %.2f ms of %d" % (*[ages[len(ages) * p // 100] * 1e-6 for p in (50, 99)], len(ages)))
     print("messages", newest.count, flush=True)
     assert set(newest.count) == {"status", "pose", "statistics"}, newest.count
+
+
+def hurried():
+    """Subscribes, and asks at once: the request must not overtake the declaration of its key."""
+    unanswered = 0
+    for _ in range(200):
+        session = connect(settle=0.0)
+        subscriber = session.declare_subscriber("hexad/%s/*" % machine, lambda sample: None)
+        unanswered += not list(session.get("hexad/%s/request/%s/status" % (machine, name), timeout=20.0))
+        session.close()
+    assert unanswered == 0, "%d of 200 requests" % unanswered
 
 
 def motions():

@@ -20,6 +20,14 @@ fn eclipse_zenoh_reads_engages_moves_and_stops() {
 }
 
 #[test]
+fn a_request_right_after_the_connection_is_answered() {
+    let Some(mut cell) = Cell::open("hurried") else { return };
+    cell.start(CABLE);
+    cell.start_client("hurried", CABLE, "studio");
+    cell.reaches("hurried", "end of hurried");
+}
+
+#[test]
 fn a_motion_ends_with_the_token_of_its_client() {
     let Some(mut cell) = Cell::open("motions") else { return };
     cell.start(CABLE);
