@@ -13,6 +13,7 @@ use crate::control::reference::tests::verification::Scene;
 use crate::control::reference::tests::*;
 use crate::control::setpoint::target::at_rest;
 use crate::control::signals::limits::Limit;
+use crate::model::conditioning::Conditioning;
 use crate::model::inverse_geometry::universal_sine;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
@@ -64,6 +65,15 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         assert!(covered(&mut balls, &constants, 0.0) && !covered(&mut balls, &constants, 10.0));
         constants.max_reference_condition = 1.0;
         assert!(!covered(&mut balls, &constants, 0.0));
+        // The poses around a knot at the limit may be beyond it, but not beyond the platform's.
+        let condition = Conditioning::new(&machine, &pose).sensitivity.condition;
+        constants.max_reference_condition = 1.001 * condition;
+        constants.parameters.condition = 2.0 * condition;
+        let mut with_ball = RegularBalls::default();
+        assert!(!is_covered(&mut with_ball, &constants, &pose, Pair { angular: 0.0, linear: 0.01 }));
+        assert!(covered(&mut with_ball, &constants, 0.01));
+        constants.parameters.condition = 1.001 * condition;
+        assert!(!covered(&mut with_ball, &constants, 0.01));
     }
 }
 
