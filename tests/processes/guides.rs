@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use crate::support::children::{HANG, Hexad, hexad};
-use crate::support::machine::Machine;
+use crate::support::machine::{Machine, patient};
 use crate::support::trio::{start_daemon, start_plant};
 use crate::support::turns;
 
@@ -18,7 +18,7 @@ fn block<'a>(guide: &'a str, language: &str) -> &'a str {
     rest.split_once("```").unwrap().0
 }
 
-/// Types the commands in the folder of the machine: with a shorter raster, and beside other tests.
+/// Types the commands in the folder of the machine, with a shorter raster. That the host is too slow is the doctor's verdict on it.
 fn type_commands(machine: &Machine, guide: &str) {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     for line in block(guide, "sh").lines() {
@@ -27,6 +27,7 @@ fn type_commands(machine: &Machine, guide: &str) {
             .replace("--config F", "--config machine.toml")
             .replace("raster.py 20", "raster.py 2")
             .replace("--seconds 5", "--seconds 2 --disturb");
+        let is_doctor = line.starts_with("hexad doctor");
         let mut command = Command::new("sh");
         let program = hexad().get_program().display().to_string();
         let line = line
@@ -34,7 +35,8 @@ fn type_commands(machine: &Machine, guide: &str) {
             .replace("examples/", &format!("{}/examples/", root.display()));
         command.current_dir(machine.folder()).args(["-c", &line]);
         let ended = Hexad::spawn(machine, "guide", command).ends_within(2 * HANG);
-        assert_eq!(ended.status.code(), Some(0), "{line}: {}{}", ended.stdout, ended.stderr);
+        let is_verdict = is_doctor && ended.stderr.ends_with("is not possible on this host\n");
+        assert!(ended.status.success() || is_verdict, "{line}: {}{}", ended.stdout, ended.stderr);
     }
 }
 
@@ -44,7 +46,7 @@ fn a_positioner_turns_about_its_vertex_and_scans() {
     let machine = Machine::with("positioner", "");
     let text = include_str!("../data/mirror_stiction.toml");
     let text = text.replace("name = \"mirror_stiction\"", &format!("name = \"{}\"", machine.name));
-    fs::write(&machine.file, format!("{text}\n{}", block(POSITIONER, "toml"))).unwrap();
+    fs::write(&machine.file, patient(&format!("{text}\n{}", block(POSITIONER, "toml")))).unwrap();
     let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
     type_commands(&machine, POSITIONER);
     let said = daemon.stops_on("TERM", HANG).stderr;
@@ -54,6 +56,7 @@ fn a_positioner_turns_about_its_vertex_and_scans() {
 
 #[test]
 fn a_machine_builder_examines_machine_and_host() {
-    let _turn = turns::beside_others();
+    // The doctor takes the processors from all others.
+    let _turn = turns::alone();
     type_commands(&Machine::with("builder", ""), BUILDER);
 }

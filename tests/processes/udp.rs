@@ -11,7 +11,7 @@ use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
 
 use crate::support::children::{HANG, Hexad, hexad, run};
-use crate::support::machine::Machine;
+use crate::support::machine::{Machine, patient};
 use crate::support::recorder::Recorder;
 use crate::support::socket::status;
 use crate::support::trio::{let_pass, start_daemon, start_plant};
@@ -77,6 +77,7 @@ struct Ride {
 /// Boarding, a flight with a pause, jumps, boarding.
 fn ride() -> Ride {
     let machine = Machine::with("udp", block(1));
+    fs::write(&machine.file, patient(&fs::read_to_string(&machine.file).unwrap())).unwrap();
     let recorder = Recorder::start(&machine.name);
     let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
     fs::write(machine.path("game.toml"), block(2)).unwrap();
@@ -188,7 +189,7 @@ fn an_open_address_a_wrong_format_and_an_unfit_file_are_refused() {
 fn a_usb_button_is_an_emergency_stop() {
     let _turn = turns::beside_others();
     for is_pressed in [true, false] {
-        let machine = Machine::with("button", "");
+        let machine = Machine::patient("button");
         let daemon = start_daemon(&machine);
         let device = machine.path("device");
         assert!(Command::new("mkfifo").arg(&device).status().unwrap().success());

@@ -25,6 +25,16 @@ allow_unstable_age = true
 force_timeout_ms = 400.0
 ";
 
+/// A machine file whose timeouts are those of [`PATIENT`]: for tests beside others, of what is no timeout.
+pub fn patient(file: &str) -> String {
+    let mut sections: toml::Table = file.parse().expect("a machine file");
+    for (name, keys) in PATIENT.parse::<toml::Table>().expect("sections") {
+        let section = sections.entry(name).or_insert_with(|| toml::Table::new().into());
+        section.as_table_mut().expect("a section").extend(keys.as_table().expect("a section").clone());
+    }
+    sections.to_string()
+}
+
 /// A machine file in a folder that goes away with it.
 pub struct Machine {
     folder: TempDir,
