@@ -13,8 +13,8 @@ use crate::support::recorder::Recorder;
 use crate::support::trio::{Trio, fastest, player_ended, start_daemon, start_setpoints};
 use crate::support::{operator, rules, turns};
 
-/// A person waits no longer.
-const SOON: Duration = Duration::from_secs(2);
+/// What ends later hangs: a busy host has held up the removal of files at the end of all processes for more than 2 s.
+const SOON: Duration = Duration::from_secs(20);
 
 #[test]
 fn sigterm_ends_each_process_in_order() {
