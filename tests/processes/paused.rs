@@ -18,8 +18,9 @@ const PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS + TIMEOUT_NS / 2);
 /// Longer than the loop stands old measurements, shorter than every timeout.
 const SHORT_PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS / 4);
 
-/// Longest silence in that pause: closer to the timeouts than this the host decides.
-const LONGEST_SILENCE_NS: u64 = TIMEOUT_NS / 4 * 3;
+/// Longest silence in that pause. After 200 ms the setpoints have departed from the continuation of the last one before by more
+/// than the tolerance, and control ends for that reason.
+const LONGEST_SILENCE_NS: u64 = TIMEOUT_NS / 8 * 3;
 
 /// A busy machine can keep the test itself from ending a pause in time; not each time.
 const ATTEMPTS: usize = 5;
