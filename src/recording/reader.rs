@@ -40,13 +40,13 @@ pub struct Summary {
 }
 
 impl Recording {
-    /// Opens a file, which must begin as an MCAP file.
+    /// Opens a file, which must begin as an MCAP file, as far as its bytes go: a crash leaves also empty files.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let recording = Self { path: path.to_path_buf() };
         let mut magic = vec![];
         let file = File::open(path).map_err(FileError::on(path))?;
         file.take(mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(FileError::on(path))?;
-        if magic != mcap::MAGIC {
+        if !mcap::MAGIC.starts_with(&magic) {
             return Err(recording.foreign("it is not an MCAP file"));
         }
         Ok(recording)

@@ -42,7 +42,9 @@ fn head(bytes: &[u8]) -> Option<((u8, usize), &[u8])> {
 fn complete_cycles(path: &Path) -> u64 {
     let bytes = fs::read(path).unwrap();
     let (mut channel, mut cycles) = (None, 0);
-    for (_, chunk) in records(&bytes[8..]).into_iter().filter(|(kind, _)| *kind == CHUNK) {
+    for (_, chunk) in
+        records(bytes.get(8..).unwrap_or_default()).into_iter().filter(|(kind, _)| *kind == CHUNK)
+    {
         // Times, size and checksum; an empty name of a compression; a length.
         for (kind, content) in records(&chunk[8 + 8 + 8 + 4 + 4 + 8..]) {
             let number = u16::from_le_bytes([content[0], content[1]]);
@@ -98,6 +100,30 @@ fn certificate_what_a_killed_daemon_has_recorded_is_recovered() {
     certificate.finish(format_args!(
         "{recovered} of {kills} recovered and replayed, the others were killed before the first chunk"
     ));
+}
+
+/// A crash of the host leaves a file of any length, also an empty one.
+#[test]
+fn a_recording_that_was_cut_anywhere_is_recovered_or_refused() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("recorded-cut");
+    let plant = start_plant(&machine);
+    let daemon = start_recording(&machine);
+    sleep(Duration::from_millis(1500));
+    for process in [daemon, plant] {
+        process.stops_on("TERM", HANG);
+    }
+    let whole = fs::read(&files(&machine, "record")[0]).unwrap();
+    let cut = machine.path("cut.mcap");
+    let mut random = Random::new(1);
+    let lengths =
+        [0, 1, 7, 8, 9].into_iter().chain((0..12).map(|_| random.below(whole.len() as u64) as usize));
+    let mut recovered = 0;
+    for length in lengths {
+        fs::write(&cut, &whole[..length]).unwrap();
+        recovered += u64::from(is_recovered(&machine, &cut));
+    }
+    assert!((1..=12).contains(&recovered), "{recovered}");
 }
 
 #[test]
