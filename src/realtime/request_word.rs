@@ -9,7 +9,7 @@
 //! | 52 to 59 | ticket: distinguishes requests of the same microsecond |
 //! | 0 to 51 | CLOCK_MONOTONIC instant of the request \[us\]: 142 years |
 
-use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 const TIME_BITS: u32 = 52;
 const NUMBER_SHIFT: u32 = 60;
@@ -22,6 +22,8 @@ pub struct RequestWord {
     /// The last word that the real-time thread has certainly loaded.
     seen: AtomicU64,
     ticket: AtomicU8,
+    /// How often each request was posted, by its number.
+    posts: [AtomicU32; 1 << (u64::BITS - NUMBER_SHIFT)],
 }
 
 /// Number of the request in a word; 0 for none.
@@ -50,6 +52,9 @@ impl RequestWord {
     /// Returns the word to wait for: the new one, or the present one if the same request is waiting already. `None` if a
     /// request of higher precedence waits.
     pub fn post(&self, request: u32, now_ns: u64) -> Option<u64> {
+        if let Some(posts) = self.posts.get(request as usize) {
+            posts.fetch_add(1, Ordering::Relaxed);
+        }
         let new = self.new_word(request, now_ns);
         let mut current = self.load();
         loop {
@@ -65,6 +70,12 @@ impl RequestWord {
                 Err(other) => current = other,
             }
         }
+    }
+
+    /// How many requests of higher precedence than this one were posted since the start, modulo 2^32.
+    pub fn posts_above(&self, request: u32) -> u32 {
+        let above = self.posts.iter().skip(request as usize + 1);
+        above.fold(0, |sum, posts| sum.wrapping_add(posts.load(Ordering::Relaxed)))
     }
 
     /// Removes a word that was not seen; without effect if another has replaced it.
@@ -104,6 +115,11 @@ mod tests {
         word.set_seen(stop);
         assert_eq!((word.post(STOP, 6000), word.load()), (None, estop));
         word.set_seen(estop);
+        assert_eq!(
+            [1, STOP, ESTOP].map(|request| word.posts_above(request)),
+            [3, 1, 0],
+            "also one that did not wait"
+        );
         let again = word.post(1, 7000).unwrap();
         assert_eq!((word.load(), number(again)), (again, 1));
     }

@@ -118,6 +118,12 @@ fn what_is_refused_is_refused_with_the_reason() {
     let said = "hexad: waiting: setpoint too far from the platform: ";
     assert!(status.code() == Some(1) && stderr.starts_with(said), "{stderr}");
     assert!(stderr.ends_with("\nhexad: interrupted\n") && stderr.lines().count() == 2, "{stderr}");
+    // Who stops a platform stops also those who wait to move it.
+    let waits = Hexad::start(&machine, "engage", &["--wait"]);
+    waits.says("waiting: setpoint too far");
+    does(&machine, "stop", &[], &["standby"]);
+    let Ended { status, stderr, .. } = waits.ends_within(HANG);
+    assert!(status.code() == Some(1) && stderr.ends_with(": a later request has replaced it\n"), "{stderr}");
     drop(offered);
     daemon.stops_on("TERM", HANG);
     plant.stops_on("TERM", HANG);

@@ -32,6 +32,8 @@ pub struct Order {
 #[derive(Clone, Copy, Debug)]
 pub struct PendingOrder {
     order: Order,
+    /// Requests of higher precedence that were posted before it.
+    posts_above: u32,
     stage: Stage,
     /// Beginning of the stage \[ns\].
     since_ns: u64,
@@ -67,8 +69,9 @@ pub enum Step {
 impl PendingOrder {
     /// Creates an order and posts it at once, unless a request of higher precedence is pending.
     pub fn post(order: Order, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Self {
-        let mut pending =
-            Self { order, stage: Stage::Posting, since_ns: now_ns, reported: DiagnosticCode::None };
+        let posts_above = word.posts_above(order.request as u32);
+        let reported = DiagnosticCode::None;
+        let mut pending = Self { order, posts_above, stage: Stage::Posting, since_ns: now_ns, reported };
         pending.try_post(snapshot, word, now_ns);
         pending
     }
@@ -85,6 +88,10 @@ impl PendingOrder {
             Stage::Posting if age_ns > ANSWER_LIMIT_NS && !self.order.is_patient => {
                 return self.unanswered(snapshot);
             }
+            // Whoever stops a platform has also stopped what waits to move it.
+            Stage::Posting | Stage::Retrying if self.is_overruled(word) => {
+                return Step::Answer(self.superseded(snapshot));
+            }
             Stage::Posting => self.try_post(snapshot, word, now_ns),
             Stage::Retrying if age_ns > RETRY_INTERVAL_NS => self.try_post(snapshot, word, now_ns),
             Stage::Posted(posted) if posted == snapshot.answered => return self.answered(snapshot, now_ns),
@@ -93,11 +100,7 @@ impl PendingOrder {
                 return self.replaced(snapshot, now_ns);
             }
             Stage::Posted(posted) if word.load() != posted => {
-                return self.answer(
-                    RequestResult::Superseded,
-                    snapshot,
-                    "a later request has replaced it".into(),
-                );
+                return Step::Answer(self.superseded(snapshot));
             }
             Stage::Posted(posted) if age_ns > ANSWER_LIMIT_NS => {
                 self.cancel_posted(posted, word);
@@ -117,7 +120,7 @@ impl PendingOrder {
         }
     }
 
-    /// Answer to the client whose later line replaces this order.
+    /// Answer to the client whose order a later request replaces.
     pub fn superseded(&self, snapshot: &Snapshot) -> AnswerLine {
         self.line(
             RequestResult::Superseded,
@@ -135,6 +138,12 @@ impl PendingOrder {
         if let Some(posted) = word.post(self.order.request as u32, now_ns) {
             (self.stage, self.since_ns) = (Stage::Posted(posted), now_ns);
         }
+    }
+
+    /// Whether a request of higher precedence was posted meanwhile.
+    fn is_overruled(&self, word: &RequestWord) -> bool {
+        let request = self.order.request;
+        !is_stop(request) && self.posts_above != word.posts_above(request as u32)
     }
 
     fn cancel_posted(&self, posted: u64, word: &RequestWord) {

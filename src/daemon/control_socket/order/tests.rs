@@ -99,6 +99,27 @@ fn what_the_loop_does_not_answer_is_withdrawn_unless_it_stops() {
     }
 }
 
+/// Also if the stop was answered, and another has engaged in vain, before the order is looked at.
+#[test]
+fn a_stop_of_another_ends_an_order_that_waits() {
+    for stop in [Request::Park, Request::Stop, Request::Off, Request::Estop] {
+        let word = RequestWord::default();
+        let mut waits = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
+        let refused = snapshot(State::Standby, word.load(), DiagnosticCode::NoSetpoint.into());
+        assert_eq!(result(&waits.step(&refused, &word, 1000)), Some(RequestResult::Waiting));
+        word.set_seen(word.load());
+        for later in [stop, Request::Engage] {
+            PendingOrder::post(order(later, false), &first_cycle(), &word, 2000);
+            word.set_seen(word.load());
+        }
+        let last = word.load();
+        assert_eq!(result(&waits.step(&refused, &word, 3000)), Some(RequestResult::Superseded), "{stop:?}");
+        assert_eq!(word.load(), last, "nothing is posted");
+        let mut new = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 4000);
+        assert_eq!(result(&new.step(&refused, &word, 5000)), None, "an order after the stop counts");
+    }
+}
+
 #[test]
 fn a_patient_order_says_once_why_it_waits_and_tries_again() {
     let word = RequestWord::default();
