@@ -1,6 +1,6 @@
 //! A minimal setpoint source: engages, raises the platform by some millimetres and lowers it again.
 //!
-//!     cargo run --example setpoint_source --no-default-features --features client -- fried2008 10
+//!     cargo run --example setpoint_source -- fried2008 10
 //!
 //! Until the daemon is in control it offers the pose in which the platform stands. Each setpoint is X, X' and X'' of one
 //! smooth motion: if one asks for more than the limits and the machine allow, the daemon comes to rest.
@@ -9,12 +9,12 @@ use std::env;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::state::{Request, State};
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, CommandMessage, PortError, SetpointMessage, StatusMessage};
-use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::{straight_move, window};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{Bus, CommandMessage, PortError, SetpointMessage, StatusMessage};
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::{Request, State};
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::minimum_jerk::{straight_move, window};
 use nalgebra::Vector6;
 
 const PERIOD: Duration = Duration::from_millis(1);

@@ -4,26 +4,25 @@
 //!
 //! # Map
 //!
-//! | folder | computes | feature |
+//! | crate | folder | computes |
 //! | --- | --- | --- |
-//! | [`model`] | mathematics of the machine: geometry, kinematics, dynamics, fidelity | |
-//! | [`control`] | input validation, states, reference, control law, limits: one cycle | |
-//! | [`motion`] | trajectories, profiles, built-in motions | |
-//! | [`plant`] | simulated platform: forward dynamics, drives, sensors | |
-//! | `analysis` | workspace, clearance, fidelity of a motion, loop margins, assembly modes | `daemon` |
-//! | `messages` | message structs and ports, for drivers | `client` |
-//! | `operator` | operator requests to the daemons of this host | `client` |
-//! | `realtime` | threads, clock, cyclic loop, exchange between threads | `daemon` |
-//! | `output` | charts, tables, CSV and JSON files | `daemon` |
-//! | `config` | machine and deployment files | `daemon` |
-//! | `recording` | every cycle in a file: format, reader, repair | `daemon` |
-//! | `daemon` | the threads, translation between messages and controller, reports | `daemon` |
-//! | `commands` | one file or folder for each command of the command line | `daemon` |
+//! | [`hexad_core`] | [`model`] | mathematics of the machine: geometry, kinematics, dynamics, fidelity |
+//! | | [`control`] | input validation, states, reference, control law, limits: one cycle |
+//! | | [`motion`] | trajectories, profiles, built-in motions |
+//! | | [`plant`] | simulated platform: forward dynamics, drives, sensors |
+//! | [`hexad_client`] | [`messages`] | message structs and ports, for drivers |
+//! | | [`operator`] | operator requests to the daemons of this host |
+//! | | [`realtime`] | threads, clock, cyclic loop, exchange between threads |
+//! | [`hexad_machine`] | [`text`] | numbers, tables of text, CSV files |
+//! | | [`analysis`] | workspace, clearance, fidelity of a motion, loop margins, assembly modes |
+//! | | [`config`] | machine and deployment files |
+//! | [`hexad_daemon`] | [`recording`] | every cycle in a file: format, reader, repair |
+//! | | [`daemon`] | the threads, translation between messages and controller, reports |
+//! | `hexad` | [`output`] | charts and pages |
+//! | | [`commands`] | one file or folder for each command of the command line |
 //!
-//! A folder uses only folders above it in this table; `tests/wall.rs` checks this. `output` is above `config`
-//! and `daemon` because both write files. The first four folders neither allocate nor do I/O nor read a clock.
-//! Without features the crate consists of these four and is `no_std`. `client` adds the needs of a driver,
-//! `daemon` (the default) everything else.
+//! A folder uses only folders above it in this table; `tests/wall.rs` checks this. The first four neither allocate nor do I/O nor read
+//! a clock. This crate names all of them again.
 //!
 //! The smallest complete use, without a daemon: `examples/controller.rs`.
 //!
@@ -117,33 +116,18 @@
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
 //! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |
 //! | work frame | frame fixed in the base, in which the pose of a tool is given |
-#![cfg_attr(not(any(feature = "client", test)), no_std)]
 
-#[cfg(feature = "daemon")]
-pub mod analysis;
-#[cfg(feature = "daemon")]
+pub use hexad_client::{messages, operator, realtime};
+pub use hexad_core::{control, model, motion, plant};
+pub use hexad_daemon as daemon;
+pub use hexad_daemon::recording;
+pub use hexad_machine::{analysis, config, log, text};
+
 #[allow(missing_docs, reason = "the command line: its help texts document it")]
 pub mod commands;
-#[cfg(feature = "daemon")]
-pub mod config;
-pub mod control;
-#[cfg(feature = "daemon")]
-pub mod daemon;
-#[cfg(feature = "client")]
-pub mod messages;
-pub mod model;
-pub mod motion;
-#[cfg(feature = "client")]
-pub mod operator;
-#[cfg(feature = "daemon")]
 pub mod output;
-pub mod plant;
-#[cfg(feature = "daemon")]
-pub mod realtime;
-#[cfg(feature = "daemon")]
-pub mod recording;
 
 /// README with the example driver, compiled as a doctest.
-#[cfg(all(doctest, feature = "daemon"))]
+#[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

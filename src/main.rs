@@ -3,8 +3,9 @@
 use std::env;
 use std::process::ExitCode;
 
+use hexad::commands::CommandLine;
 use hexad::commands::demo::children::PARENT_VARIABLE;
-use hexad::commands::{CommandLine, log};
+use hexad::log;
 use hexad::realtime::allocation::CountingAllocator;
 use hexad::realtime::process::stop_with_parent;
 
@@ -17,7 +18,7 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let command = CommandLine::from_arguments();
-    log::install(command.log_format);
+    let _log = log::install(command.log_format);
     match command.execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -1,12 +1,8 @@
-//! An adversary: it searches for messages, requests, rates and machines that move the platform beyond a limit.
+//! An adversary: it searches for messages, requests, rates, machines and worlds that move the platform beyond a limit.
 //!
-//! A genome describes a run of the controller against the plant with exactly the model's parameters. Each run is scored
-//! by the true motion of the platform. The search begins with the worst runs that were ever found, goes on with random ones
-//! and climbs from the best of each quantity.
-//!
-//! `HEXAD_LONG=1` searches for 1e6 cycles under control of each machine with each policy, `HEXAD_LONG=5` for five times as many;
-//! `HEXAD_SEED` begins elsewhere; `HEXAD_ADVERSARY_KEEP=FILE` writes the worst genomes, and `HEXAD_ADVERSARY_TRACE` with the test
-//! `trace` prints one run.
+//! `hexad_support::search` has the search and the list of properties. `HEXAD_LONG=1` searches for 1e6 cycles under control of each
+//! machine with each policy, `HEXAD_LONG=5` for five times as many, `HEXAD_SEARCH_SECONDS=60` for as long; `HEXAD_SEED` begins
+//! elsewhere; `HEXAD_ADVERSARY_KEEP=FILE` writes the worst genomes, and `HEXAD_ADVERSARY_TRACE=FILE` with the test `trace` prints one run.
 
 #![allow(
     clippy::unwrap_used,
@@ -16,16 +12,6 @@
     reason = "helpers of tests"
 )]
 
-use crate::common;
-
-mod genome;
-mod machines;
-mod messages;
-mod run;
-mod scenario;
 mod scorer;
-mod search;
-mod stream;
-mod table;
 mod tests;
 mod trace;

@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common::{MACHINES, machine, motions, states};
 use crate::near_singular::scenes::scenes;
 use hexad::analysis::batch::{self, forces_of_rows};
 use hexad::model::active_forces::InverseDynamics;
@@ -15,6 +14,7 @@ use hexad::model::random::Random;
 use hexad::model::regressor::regressor;
 use hexad::model::rigid::{Motion, Pose, Twist};
 use hexad::model::task::TaskState;
+use hexad_support::{MACHINES, machine, motions, states};
 use indicatif::ProgressBar;
 use nalgebra::{Vector3, Vector6};
 

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
-
 mod clients {
     mod batch;
     mod declarations;
@@ -21,8 +19,8 @@ use std::process::{self, Command};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
 
-use crate::common::libhexad::repository;
-use crate::common::process::Process;
+use hexad_support::process::Process;
+use hexad_support::repository;
 
 /// A file of this test.
 fn file(name: &str) -> PathBuf {

@@ -2,10 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod ages;
 mod allowed_disturbances;
+mod answer;
 mod assessment;
 mod built_in;
 mod disturbances;

@@ -1,9 +1,6 @@
 //! The controller: alone, in closed loop with the simulated platform, against searches for its worst. Time is simulated.
 
-mod common;
-
 mod adversary;
-mod as_shipped;
 mod closed_loop;
 mod cycles;
 mod faults;

@@ -6,8 +6,6 @@
 
 #![allow(clippy::expect_used, clippy::unreachable, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod external;
 mod oracle;
 mod policies;

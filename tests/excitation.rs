@@ -37,6 +37,7 @@ fn reach(config: &Config, excitation: &Excitation) -> f64 {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn an_excitation_keeps_every_limit_of_the_machine() {
     for name in MACHINES {
         let config = shipped(name);
@@ -56,6 +57,7 @@ fn an_excitation_keeps_every_limit_of_the_machine() {
 
 /// Strokes from 0.1 mm to a metre, and drives of 1 mm/s.
 #[test]
+#[ignore = "second tier: takes long"]
 fn machines_of_every_size_are_excited() {
     for name in ["mirror_unknown_friction", "piezo", "hobby", "telescope_m2", "plate_3m"] {
         let config = Config::load(format!("tests/data/{name}.toml").as_ref()).unwrap();
@@ -68,6 +70,7 @@ fn machines_of_every_size_are_excited() {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn counted_periods_repeat_and_derivatives_belong_to_the_motion() {
     let config = shipped("fried2008");
     let excitation = excitation(&config, 3, 1.0);
@@ -92,6 +95,7 @@ fn counted_periods_repeat_and_derivatives_belong_to_the_motion() {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn the_design_is_repeatable_and_gentle_on_request() {
     let config = shipped("fried2008");
     let series = |seed| design(&config.machine, 0.05, seed, |_| true).unwrap().series;
@@ -103,6 +107,7 @@ fn the_design_is_repeatable_and_gentle_on_request() {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn the_design_beats_random_motions() {
     for seed in 0..2 {
         let found = design(&shipped("motion_base").machine, 1.0, seed, |_| true).unwrap();

@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod advise;
 mod dense;
 mod envelope;
 mod scenes;
+
+use hexad::analysis::reachable_envelope;
+
+use crate::*;

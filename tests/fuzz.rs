@@ -25,7 +25,7 @@
 
 #![allow(clippy::panic, clippy::expect_used, clippy::indexing_slicing)]
 
-mod properties;
+pub mod properties;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::ViolationPolicy;
 
-use crate::common::certificate::Certificate;
+use hexad_support::certificate::Certificate;
 
 /// Memory of this process at its largest: the readers' bounds and the test itself \[kB\].
 const MAX_MEMORY_KB: u64 = 256 << 10;
@@ -60,6 +60,7 @@ fn replay(hold: fn(&[u8]) -> bool, folders: &[&str], extension: &str) {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn configuration_files() {
     replay(properties::config::hold, &["tests/fuzz/seeds/config", "config", "tests/data"], "toml");
 }
@@ -70,6 +71,7 @@ fn machines() {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn cycles() {
     replay(properties::step::hold, &["tests/fuzz/seeds/step"], "");
 }

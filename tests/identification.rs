@@ -10,8 +10,8 @@ use hexad::model::random::Random;
 use hexad::model::transmission::Transmission;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::common::identified::{Series, drawn, loaded, worst_error};
-use crate::common::machine;
+use hexad_support::identified::{Series, drawn, loaded, worst_error};
+use hexad_support::machine;
 
 fn run(truth: &Machine, series: &Series, seconds: f64, noise: f64, load: Load, random: &mut Random) -> Run {
     let sample = |k: u32| {

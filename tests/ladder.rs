@@ -3,9 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
-use common::{Errors, Legs, MACHINES, Table, data, machine, motions};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{
     Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
@@ -17,6 +14,7 @@ use hexad::model::regressor::{
 };
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::task::TaskState;
+use hexad_support::{Errors, Legs, MACHINES, Table, data, machine, motions};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Of the largest force of the row: rounding, times the condition.

@@ -9,31 +9,18 @@
     clippy::indexing_slicing,
     reason = "helpers of tests"
 )]
-#![allow(dead_code, reason = "a part of the adversary's modules is used")]
 
 use hexad::control::controller::Controller;
 use hexad::control::parameters::ViolationPolicy;
 use hexad::realtime::setup::denormals;
 
-use crate::common;
-use common::not_run::lacking;
-use genome::Genome;
-use machines::MACHINES;
+use hexad_support::not_run::lacking;
+use hexad_support::search::genome::Genome;
+use hexad_support::search::machines::MACHINES;
+use hexad_support::search::run;
 
 #[path = "../benches/longest_cycle/count.rs"]
 mod count;
-#[path = "adversary/genome.rs"]
-mod genome;
-#[path = "adversary/machines.rs"]
-mod machines;
-#[path = "adversary/messages.rs"]
-mod messages;
-#[path = "adversary/run.rs"]
-mod run;
-#[path = "adversary/scenario.rs"]
-mod scenario;
-#[path = "adversary/stream.rs"]
-mod stream;
 #[path = "../benches/longest_cycle/usual.rs"]
 mod usual;
 

@@ -5,8 +5,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod beyond_the_envelope;
 mod engage_in_motion;
 mod frozen_sensors;

@@ -3,8 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
-
 mod mujoco {
     use super::*;
 
@@ -31,7 +29,7 @@ use hexad::model::task::TaskState;
 use mujoco::python;
 use nalgebra::Vector3;
 
-use common::{Errors, MACHINES, Table, data, largest, machine, motions};
+use hexad_support::{Errors, MACHINES, Table, data, largest, machine, motions};
 
 /// The machines that come with hexad.
 const DEPLOYED: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];

@@ -1,22 +1,16 @@
 //! Near singular poses: the forces and the twist are as accurate as LU with partial pivoting makes them, to
-//! a factor of two, whatever the condition; judged by 32 digits.
+//! a factor of two, whatever the condition; judged by a solution that is rounded once.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
-
-use crate::common;
 
 pub mod reference;
 pub mod scenes;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use common::Errors;
-use hexad::model::fidelity::Exact;
-use hexad::model::inverse_jacobian::{leg_wrenches, twist_from_rates};
-use hexad::model::machine::Machine;
-use hexad::model::rigid::Pose;
-use nalgebra::{Matrix3, Vector6};
 use scenes::{Scene, scenes};
+
+use crate::*;
 
 /// What the errors may be, over those of partial pivoting.
 const WORST_RATIO: f64 = 2.0;
@@ -112,9 +106,9 @@ fn no_worse_than_twice_partial_pivoting() {
 /// The machines' own motions do not need the fallback, which costs time.
 #[test]
 fn the_blocks_serve_the_motions_of_every_machine() {
-    for name in common::MACHINES {
-        let machine = common::machine(name);
-        for motion in common::motions(name) {
+    for name in MACHINES {
+        let machine = machine(name);
+        for motion in motions(name) {
             let (d_a, d_s) = determinants(&machine, &motion.pose);
             assert!(d_a.abs() > LEAST_DA && d_s.abs() > 1.0, "{name}: {d_a} {d_s}");
         }

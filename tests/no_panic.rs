@@ -45,7 +45,7 @@ use executable::Executable;
 use reach::reached_from;
 
 /// The loop, from the first release to the end of the last cycle.
-const LOOP: &str = "hexad::realtime::cyclic::run_cycles";
+const LOOP: &str = "hexad_client::realtime::cyclic::run_cycles";
 
 /// What the loop may call of the C library, and from where, if not from everywhere.
 const ALLOWED: &[(&str, Option<&str>)] = &[
@@ -56,13 +56,13 @@ const ALLOWED: &[(&str, Option<&str>)] = &[
     ("clock_gettime", None),
     // The sleeps, until an instant or a message.
     ("clock_nanosleep", None),
-    ("syscall", Some("hexad::realtime::futex::wait")),
+    ("syscall", Some("hexad_client::realtime::futex::wait")),
 ];
 
 /// What the walk has to come by, or it goes astray: both sleeps, the angles of the setpoint, the last resort
 /// of the model.
 const LANDMARKS: [&str; 4] =
-    ["clock_nanosleep", "syscall", "libm::math::sincos::sincos", "hexad::model::lu::solve"];
+    ["clock_nanosleep", "syscall", "libm::math::sincos::sincos", "hexad_core::model::lu::solve"];
 
 /// The instruction sets that the model is compiled for, beside the one that all processors of a kind have.
 #[cfg(target_arch = "x86_64")]

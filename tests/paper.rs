@@ -30,8 +30,8 @@
 //! 2. (43), (45), last term. Printed: wrong units. Right: `+ R_b L'~ L~ R_b^T / L^2`, acting on the leg's angular
 //!    velocity: `-(L'/L) omega`.
 //! 3. (74)-(82), H_1. Printed: no component along the leg. Right: the universal joint makes the leg spin:
-//!    `sin(gamma) beta'` about its axis. No effect without axial inertia (tsai2000); more than threefold for each
-//!    halving of the angle to the first axis.
+//!    `sin(gamma) beta'` about its axis. No effect without axial inertia (tsai2000); beside the first axis it
+//!    grows with the inverse cube of the angle to it (`tests/stability/legs.rs`).
 //! 4. (88), (93). Printed: g with the sign opposite to (74)-(81). Right: `v' - g` for platform and legs alike.
 //! 5. (90), (91). Printed: inertia about the centre of mass beside first moments about C. Right:
 //!    `I_C = I_G - m c~ c~`. No effect for a centred platform (fried2008).
@@ -77,8 +77,6 @@
     reason = "a test helper that fails is a failed test; indices count legs, links and axes"
 )]
 
-use crate::common;
-
 mod agreement;
 mod errata;
 mod joint_accelerations;
@@ -86,3 +84,11 @@ mod joint_space;
 mod last_term;
 mod power;
 mod vectors;
+
+use hexad_support::paper::dense::Dense;
+use hexad_support::paper::force::{at_c, energy, forces, leg_rates, platform_wrench};
+use hexad_support::paper::form::{EXACT, Form, Inertia, LastTerm, PAPER, Rates};
+use hexad_support::paper::kinematics::{Leg, State, joint, legs, platform};
+use hexad_support::paper::machine::{Drive, Machine};
+
+use crate::*;

@@ -3,8 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod brakes;
 mod dynamics;
 mod elastic;
@@ -16,21 +14,11 @@ mod imperfect;
 mod integration;
 mod power;
 
-use hexad::model::LEGS;
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
-use hexad::model::task::TaskState;
-use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::hardware::Hardware;
-use hexad::plant::imperfections::{
-    BuildErrors, DriveErrors, ElasticLeg, ExternalWrench, Friction, Imperfections, SensorErrors,
-};
 use hexad::plant::integrator::{Accelerations, BodyState, DriveStates, PlantState};
-use hexad::plant::simulator::Simulator;
-use nalgebra::{Vector3, Vector6};
+use hexad::plant::simulator::{Brakes, Simulator};
+
+use crate::*;
 
 /// Default of `plant.step_us`.
 const DEFAULT_STEP_S: f64 = 250e-6;
@@ -80,7 +68,7 @@ fn without_drives(mut machine: Machine) -> Machine {
 }
 
 fn home(machine: &Machine) -> BodyState {
-    BodyState { pose: TaskState::at_rest(machine.home).motion().pose, twist: Twist::default() }
+    BodyState { pose: machine.home_pose(), twist: Twist::default() }
 }
 
 /// The model's state a step later under constant forces.
@@ -108,7 +96,7 @@ fn legs(machine: &Machine, state: &BodyState) -> ([f64; LEGS], [f64; LEGS]) {
 /// Forces that carry the platform and shake it about home: six sines of up to `size` radii and as many
 /// radians, below `hertz`, and a damped spring of that frequency that brings it back.
 fn shaking(machine: &Machine, state: &BodyState, t: f64, size: f64, hertz: f64) -> [f64; LEGS] {
-    let w = core::f64::consts::TAU * hertz;
+    let w = TAU * hertz;
     let sine = |k: f64| (w * (0.3 + 0.09 * k) * t).sin() * size;
     let back = state.pose.displacement_to(&home(machine).pose);
     let Twist { angular, linear } = state.twist;

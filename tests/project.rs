@@ -1,8 +1,7 @@
-//! The repository itself, and what reads files from people: arrows between folders, documents, units of the service,
+//! The repository itself, and what reads files and command lines from people: arrows between folders, documents, units of the service,
 //! configuration files, arbitrary bytes, drawing of charts.
 
-mod common;
-
+mod commands;
 mod configuration;
 mod deploy;
 mod documents;

@@ -4,8 +4,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod dynamics;
 mod frames;
 mod invariance;
@@ -15,17 +13,10 @@ mod regressor;
 mod rotations;
 mod stances;
 
-use std::sync::LazyLock;
-
-use common::{Legs, MACHINES, machine};
-use hexad::model::LEGS;
-use hexad::model::inverse_jacobian::condition;
-use hexad::model::machine::{Link, Machine};
-use hexad::model::rigid::Motion;
-use hexad::model::task::TaskState;
-use nalgebra::{Matrix3, Vector3, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+
+use crate::*;
 
 /// Where a tolerance is multiplied by the condition number, worse poses would say nothing.
 const WORST_CONDITION: f64 = 100.0;
@@ -59,7 +50,7 @@ fn direction() -> impl Strategy<Value = Vector3<f64>> {
 }
 
 fn rotation() -> impl Strategy<Value = Matrix3<f64>> {
-    [-3.1..3.1f64, -3.1..3.1, -3.1..3.1].prop_map(|[a, b, c]| common::rotation(a, b, c))
+    [-3.1..3.1f64, -3.1..3.1, -3.1..3.1].prop_map(|[a, b, c]| hexad_support::rotation(a, b, c))
 }
 
 /// The six legs' vectors of a machine, disturbed by up to `size` each.
@@ -134,7 +125,7 @@ fn machine_in_motion() -> impl Strategy<Value = (Machine, TaskState, Motion)> {
             (machine, state, state.motion())
         })
         .prop_filter("near a singularity", |(machine, _, motion)| {
-            let n = hexad::model::inverse_geometry::leg_directions(machine, &motion.pose);
+            let n = leg_directions(machine, &motion.pose);
             let u = Legs::of(machine).universal_axis;
             let sines = n.iter().zip(&u).map(|(n, u)| n.cross(u).norm());
             sines.fold(1.0, f64::min) > 0.2 && condition(machine, &motion.pose) < WORST_CONDITION
@@ -144,5 +135,5 @@ fn machine_in_motion() -> impl Strategy<Value = (Machine, TaskState, Motion)> {
 /// Largest difference, as a share of the largest of `b`.
 fn relative(a: &[f64], b: &[f64]) -> f64 {
     let difference: Vec<_> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-    common::largest(&difference) / common::largest(b).max(f64::MIN_POSITIVE)
+    largest(&difference) / largest(b).max(f64::MIN_POSITIVE)
 }

@@ -1,10 +1,8 @@
 //! What must hold of the code that ships: one codegen unit, without debug assertions.
 //!
-//! `cargo test` builds and runs this with `--release` (`as_shipped`). A part of it: `cargo test --release --test shipped vectors`.
+//! `tests/all` builds and runs this with `--release`. A part of it: `cargo test --release --test shipped vectors`.
 
 #![allow(clippy::unwrap_used, reason = "a failed assertion is how a test speaks")]
-
-mod common;
 
 mod golden;
 mod longest_cycle;

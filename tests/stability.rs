@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod beyond;
 mod check;
 mod dietmaier;
@@ -14,3 +12,12 @@ mod passing;
 mod random;
 mod sampled;
 mod sizes;
+
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad::control::signals::state::{Request, State};
+use hexad::motion::minimum_jerk::{Profile, rise};
+use hexad_support::rig::Rig;
+use hexad_support::stability::trials::{End, Method, ambiguous, pose, rigid, step, trial, within_reach};
+
+use crate::*;

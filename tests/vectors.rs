@@ -3,8 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
 mod forward;
 mod inverse;
 mod refusals;
@@ -15,7 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{Table, data};
+use hexad_support::{Table, data};
 use tempfile::TempDir;
 
 /// What a run of the binary left behind.

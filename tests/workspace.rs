@@ -2,16 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use crate::common;
-
-mod cells;
 mod command;
 mod forces;
 mod regions;
 
-use hexad::analysis::envelope::MotionEnvelope;
-use hexad::model::machine::Machine;
-use nalgebra::Vector3;
+use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
+
+use crate::*;
 
 /// Numbers in -1..1, six of the k-th even point.
 fn numbers(k: u32) -> [f64; 6] {
@@ -23,7 +20,7 @@ fn numbers(k: u32) -> [f64; 6] {
 fn directions(k: u32) -> [Vector3<f64>; 2] {
     let shares = MotionEnvelope::spread(k);
     [0, 2].map(|first| {
-        let (z, angle) = (2.0 * shares[first] - 1.0, core::f64::consts::TAU * shares[first + 1]);
+        let (z, angle) = (2.0 * shares[first] - 1.0, TAU * shares[first + 1]);
         let radius = (1.0 - z * z).sqrt();
         Vector3::new(radius * angle.cos(), radius * angle.sin(), z)
     })

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::run::Run;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
-use super::{Charts, Failure, MODES, cells, common, play};
+use super::{Charts, Failure, MODES, cells, play};
 
 const FILE: &str = "closed_loop_disturbances.csv";
 /// What a disturbance observer of 10 Hz, which the estimator has replaced, did for computed torque; measured rates, and setpoints
@@ -56,7 +56,7 @@ const SWEEPS: [Sweep; 4] = [
 ];
 
 fn payload(percent: f64) -> Imperfections {
-    let body = common::deployed(MACHINE).machine.platform;
+    let body = hexad_support::deployed(MACHINE).machine.platform;
     let mut imperfections = Imperfections::default();
     imperfections.build.payload = 0.01 * percent * body.mass;
     imperfections.build.payload_at = body.center_of_mass;

@@ -13,8 +13,6 @@
     reason = "helpers of tests, of which this bench uses a part"
 )]
 
-#[path = "../../tests/common/mod.rs"]
-mod common;
 mod disturbances;
 mod rates;
 mod run;

@@ -16,17 +16,15 @@ use hexad::model::task::TaskState;
 use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::Imperfections;
 
-use super::common::fast::Fast;
-use super::common::{Errors, angle_between};
+use hexad_support::fast::Fast;
+use hexad_support::rig::START_NS;
+use hexad_support::{Errors, angle_between};
 
 /// From measurement to force, as a share of the period: release in its middle, then reading, computing, sending.
 const DELAY: f64 = 0.6;
 
 /// What the loop has to find its pose, engage, and estimate its disturbances \[s\].
 const SETTLING_S: f64 = 2.0;
-
-/// The clock of a computer that has been up for a while.
-const START_NS: u64 = 86_400_000_000_000;
 
 /// What is run.
 #[derive(Clone)]

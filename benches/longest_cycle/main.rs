@@ -16,22 +16,8 @@
     reason = "helpers of tests, of which this bench uses a part"
 )]
 
-#[path = "../../tests/common/mod.rs"]
-mod common;
 mod count;
-#[path = "../../tests/adversary/genome.rs"]
-mod genome;
-#[path = "../../tests/adversary/machines.rs"]
-mod machines;
-#[path = "../../tests/adversary/messages.rs"]
-mod messages;
-#[path = "../../tests/adversary/run.rs"]
-mod run;
-#[path = "../../tests/adversary/scenario.rs"]
-mod scenario;
 mod search;
-#[path = "../../tests/adversary/stream.rs"]
-mod stream;
 #[path = "../support/mod.rs"]
 mod support;
 mod usual;
@@ -46,8 +32,8 @@ use hexad::control::parameters::ViolationPolicy;
 use hexad::realtime::setup::denormals;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use genome::Genome;
-use machines::MACHINES;
+use hexad_support::search::genome::Genome;
+use hexad_support::search::machines::MACHINES;
 use search::Search;
 use support::omissions::Omissions;
 use support::{Extent, Failure, exit_code};

@@ -11,9 +11,9 @@ use hexad::control::signals::state::State;
 use hexad::model::random::Random;
 
 use super::count::instructions;
-use super::genome::{Genome, Sensors};
-use super::run::run_with;
-use super::scenario::Scenario;
+use hexad_support::search::genome::{Genome, Sensors, World};
+use hexad_support::search::run::run_with;
+use hexad_support::search::scenario::Scenario;
 
 /// Runs that had the longest cycles of their time.
 const KNOWN: &str = include_str!("longest.txt");
@@ -82,6 +82,7 @@ impl Search {
                 machines.start + index(random, machines.len()),
                 policy,
                 Sensors::Exact,
+                World::Model,
                 random,
             );
         }

@@ -2,11 +2,10 @@
 
 use hexad::control::parameters::ViolationPolicy;
 
-use super::common::fast::Fast;
-use super::common::observed::Observed;
-use super::common::rig;
 use super::count::instructions;
-use super::machines::{RATES_HZ, Variant, variant};
+use hexad_support::fast::Fast;
+use hexad_support::rig::{self, Rig};
+use hexad_support::search::machines::{RATES_HZ, Variant, variant};
 
 const RATE_HZ: f64 = 1000.0;
 
@@ -17,7 +16,7 @@ pub fn median(machine: usize, policy: ViolationPolicy, counted: usize) -> u64 {
     let mut parameters = rig::parameters(&config);
     parameters.on_violation = policy;
     let scene = Fast::new(&config);
-    let mut observed = Observed::with(&config, &config.machine, parameters);
+    let mut observed = Rig::metered(&config, &config.machine, parameters);
     observed.engage(&scene.at(0.0));
     let begun_s = observed.time_s();
     let cycles = (scene.duration() / observed.period_s()) as usize;

@@ -14,7 +14,7 @@ use hexad::control::controller::{Controller, Output};
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
 use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
-use hexad::daemon::cycle::CycleRecord;
+use hexad::daemon::cycle::{self, CycleRecord};
 use hexad::daemon::parameters;
 use hexad::messages::clock::monotonic_ns;
 use hexad::model::fidelity::Fidelity;
@@ -22,7 +22,6 @@ use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::realtime::clock::Monotonic;
-use hexad::realtime::cyclic;
 use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
@@ -172,7 +171,7 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
                 output
             };
             let report =
-                cyclic::run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop);
+                cycle::run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop);
             fleet.all_were_active().map(|()| report)
         });
         let begin = Instant::now();

@@ -14,8 +14,6 @@
 //! ```
 
 mod chart;
-#[path = "../../tests/common/mod.rs"]
-mod common;
 mod leg_by_leg;
 mod methods;
 mod paper;

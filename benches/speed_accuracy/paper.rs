@@ -5,9 +5,9 @@
 
 use nalgebra::Vector6;
 
-pub use crate::common::paper::kinematics::State;
-pub use crate::common::paper::machine::Machine;
-use crate::common::paper::{force, form};
+pub use hexad_support::paper::kinematics::State;
+pub use hexad_support::paper::machine::Machine;
+use hexad_support::paper::{force, form};
 
 /// Forces of the six legs with every term, the drives' share included \[N\].
 pub fn forces(machine: &Machine, state: &State) -> Vector6<f64> {

@@ -15,13 +15,13 @@ use hexad::model::LEGS;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
-use hexad::output::csv_table::{NumberTable, legs, six, trajectory_columns};
+use hexad::text::csv_table::{NumberTable, legs, six, trajectory_columns};
 
 use super::Failure;
-use super::common::data;
 use super::methods::Forces;
 use super::paper::{self, State};
 use super::peers::Errors;
+use hexad_support::data;
 
 /// The machines whose scenes are evaluated.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];

@@ -6,7 +6,7 @@ use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
 use super::speed::newton;
 use super::support::provenance;
-use super::{Charts, Failure, MACHINES, cells, common};
+use super::{Charts, Failure, MACHINES, cells};
 
 const RATES_HZ: [f64; 2] = [1000.0, 250.0];
 /// Length of the motion \[s\].
@@ -15,7 +15,7 @@ const SECONDS: f64 = 4.0;
 pub fn run(charts: &Charts) -> Result<(), Failure> {
     let (mut rows, mut lines) = (vec![], vec![]);
     for name in MACHINES {
-        let machine = common::machine(name);
+        let machine = hexad_support::machine(name);
         let scene = fit(&machine, BuiltInMotion::Sines, SECONDS);
         for rate_hz in RATES_HZ {
             let mut estimate = scene.at(0.0).motion().pose;

@@ -13,8 +13,6 @@
     reason = "helpers of tests, of which this bench uses a part"
 )]
 
-#[path = "../../tests/common/mod.rs"]
-mod common;
 mod cycles;
 mod maps;
 mod sampled;
@@ -28,7 +26,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use common::stability::{delayed, rivals, trials};
+use hexad_support::stability::{delayed, rivals, trials};
 use support::charts::Charts;
 use support::{ChartArguments, Failure, cells, exit_code};
 

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::rivals::Update;
 use super::trials::{End, Method, ambiguous, pose, step, trial, within_reach};
-use super::{Charts, Failure, MACHINES, cells, common};
+use super::{Charts, Failure, MACHINES, cells};
 
 /// Largest angle of the poses from home on every axis \[deg\].
 const ANGLES_DEG: [u32; 12] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60];
@@ -22,7 +22,7 @@ const METHODS: [(&str, Method); 3] = [
 pub fn run(charts: &Charts, fewer: u64) -> Result<(), Failure> {
     let mut rows = vec![];
     for name in MACHINES {
-        let machine = common::machine(name);
+        let machine = hexad_support::machine(name);
         for (method_name, method) in METHODS {
             for angle_deg in ANGLES_DEG {
                 let angle = f64::from(angle_deg).to_radians();
@@ -92,7 +92,7 @@ pub fn draw(charts: &Charts) -> Result<(), Failure> {
 
 /// From home, and from one measurement to the next: nothing wrong that nobody notices.
 fn million(fewer: u64) -> Result<(), Failure> {
-    let machines: Vec<_> = common::MACHINES.map(common::machine).into();
+    let machines: Vec<_> = hexad_support::MACHINES.map(hexad_support::machine).into();
     let trials = MILLION / fewer;
     // reachable, wrong from home, of these unnoticed; followed, refused, deceived steps
     let sums = (0..trials)

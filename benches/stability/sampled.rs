@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use super::delayed::boundary;
-use super::{Charts, Failure, cells, common};
+use super::{Charts, Failure, cells};
 
 const FILE: &str = "stability_sampled.csv";
 
@@ -46,7 +46,7 @@ fn loops() -> Vec<SampledLoop> {
 }
 
 pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
-    let mut config = common::deployed("fried2008");
+    let mut config = hexad_support::deployed("fried2008");
     config.machine.gravity.fill(0.0);
     let delays = if quick { vec![QUICK_DELAY] } else { delays(FOUND) };
     let mut rows = vec![];

@@ -15,7 +15,7 @@ use super::rivals::Update;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::timing::{Samples, sample};
 use super::trials::{pose, rigid};
-use super::{Charts, Failure, MACHINES, cells, common, rivals};
+use super::{Charts, Failure, MACHINES, cells, rivals};
 
 const FILE: &str = "stability_speed.csv";
 
@@ -82,7 +82,7 @@ pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
     let rounds = if quick { QUICK_ROUNDS } else { ROUNDS };
     let mut rows = vec![];
     for name in MACHINES {
-        let machine = common::machine(name);
+        let machine = hexad_support::machine(name);
         for (start, distance) in STARTS {
             let cases = cases(&machine, distance);
             let mut add = |method: String, find: &dyn Fn(&Case) -> Pose| {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hexad::output::files::write_whole;
+use hexad::text::files::write_whole;
 use serde::de::DeserializeOwned;
 
 use super::{Failure, provenance};

@@ -1,6 +1,6 @@
 //! A driver to copy: measures, publishes, applies forces, brakes when none may be applied.
 //!
-//!     cargo run --example driver --no-default-features --features client -- fried2008
+//!     cargo run --example driver -- fried2008
 //!
 //! Replace `fake_drive.rs` by your drives, and the sleep by an absolute timer at their rate. The rest is what every driver has
 //! to do: the stamp of the instant of sampling, a watchdog, drives that report that they are ready, brakes closed at every end.
@@ -15,8 +15,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use fake_drive::{ALL_LEGS, FakeDrive};
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, ForceMessage, MeasuredMessage};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{Bus, ForceMessage, MeasuredMessage};
 
 const PERIOD_NS: u64 = 1_000_000;
 

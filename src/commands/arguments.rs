@@ -4,11 +4,12 @@ use core::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
-use crate::config::{Config, ConfigError};
-use crate::output::csv_table::GROUPS;
+use hexad_core::motion::built_in::BuiltInMotion;
+use hexad_machine::config::{Config, ConfigError};
+use hexad_machine::text::csv_table::GROUPS;
 
 /// Help text of `--group`.
 pub const GROUP_HELP: &str =
@@ -76,6 +77,15 @@ pub struct TableFiles {
     pub rotation: OrientationFormat,
     #[arg(long, help = GROUP_HELP, value_name = "GROUP", value_parser = PossibleValuesParser::new(GROUPS))]
     pub group: Option<String>,
+}
+
+/// Parser of the names of built-in motions.
+pub fn built_in_motion() -> impl TypedValueParser<Value = BuiltInMotion> {
+    let names = BuiltInMotion::ALL.map(BuiltInMotion::name_and_description);
+    let values = names.map(|(name, description)| PossibleValue::new(name).help(description));
+    PossibleValuesParser::new(values).map(|name| {
+        BuiltInMotion::ALL.into_iter().find(|motion| motion.name() == name).unwrap_or(BuiltInMotion::Settle)
+    })
 }
 
 /// Duration \[s\] of a motion, a wait or a measurement.

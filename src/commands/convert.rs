@@ -6,10 +6,10 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::report::signals::CycleInstants;
-use crate::config::Config;
-use crate::output::files::{is_standard, print};
-use crate::recording::reader::Recording;
-use crate::recording::table::{TableOrigin, write_csv};
+use hexad_daemon::recording::reader::Recording;
+use hexad_daemon::recording::table::{TableOrigin, write_csv};
+use hexad_machine::config::Config;
+use hexad_machine::text::files::{is_standard, print};
 
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
@@ -24,8 +24,9 @@ pub struct ConvertArguments {
 impl ConvertArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
-        let info = recording.summary()?.info;
-        let config = Config::parse(&info.configuration, "configuration of the recording")?;
+        let summary = recording.summary()?;
+        recording.remark(&summary);
+        let config = Config::parse(&summary.info.configuration, "configuration of the recording")?;
         let CycleInstants { reference_ns, .. } = CycleInstants::of_controller(&config);
         let origin = TableOrigin { home: config.machine.home, reference_ns };
         let summary = write_csv(&recording, &origin, &self.csv)?;

@@ -11,17 +11,17 @@ use super::arguments::{MachineFile, number_within};
 use super::failure::Failure;
 use super::r#move::PlaybackOptions;
 use super::r#move::trajectory::Trajectory;
-use crate::analysis::excitation_design::{Sensitivities, base_values};
-use crate::analysis::identification::expected_deviations;
-use crate::config::Config;
-use crate::model::regressor::{COULOMB, REFLECTED, VISCOUS};
-use crate::model::{LEGS, machine::Machine};
-use crate::motion::excitation::{Excitation, PERIOD_S};
-use crate::output::csv_table::trajectory_columns;
-use crate::output::csv_writer::CsvWriter;
-use crate::output::files::{is_standard, print};
-use crate::output::numbers::{percent, plain_percent, significant};
-use crate::output::text_table::{Left, Right, text_table};
+use hexad_core::model::regressor::{COULOMB, REFLECTED, VISCOUS};
+use hexad_core::model::{LEGS, machine::Machine};
+use hexad_core::motion::excitation::{Excitation, PERIOD_S};
+use hexad_machine::analysis::excitation_design::{Sensitivities, base_values};
+use hexad_machine::analysis::identification::expected_deviations;
+use hexad_machine::config::Config;
+use hexad_machine::text::csv_table::trajectory_columns;
+use hexad_machine::text::csv_writer::CsvWriter;
+use hexad_machine::text::files::{is_standard, print};
+use hexad_machine::text::numbers::{percent, plain_percent, significant};
+use hexad_machine::text::text_table::{Left, Right, text_table};
 
 /// Noise of the forces for which deviations are predicted, as a ratio of `actuator.max_force_n`, and its rate \[Hz\].
 const NOISE_RATIO: f64 = 0.01;

@@ -2,16 +2,16 @@
 
 use core::error::Error;
 
-use crate::config::ConfigError;
-use crate::daemon::DaemonError;
-use crate::daemon::control_socket::location::SocketError;
-use crate::daemon::target_source::TargetError;
-use crate::messages::PortError;
-use crate::operator::OperatorError;
-use crate::operator::protocol::RequestResult;
-use crate::output::files::FileError;
 use crate::output::svg::ChartError;
-use crate::recording::RecordingError;
+use hexad_client::messages::PortError;
+use hexad_client::operator::OperatorError;
+use hexad_client::operator::protocol::RequestResult;
+use hexad_daemon::DaemonError;
+use hexad_daemon::control_socket::location::SocketError;
+use hexad_daemon::recording::RecordingError;
+use hexad_daemon::target_source::TargetError;
+use hexad_machine::config::ConfigError;
+use hexad_machine::text::files::FileError;
 
 /// Exit code of a command that a signal has interrupted, as shells use it for SIGINT.
 pub const INTERRUPTED: u8 = 130;

@@ -6,11 +6,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::failure::Failure;
-use crate::control::signals::diagnostic::{DiagnosticCode, Reaction};
-use crate::control::signals::limits::Limit;
-use crate::control::signals::state::State;
-use crate::output::files::{print, print_json};
-use crate::output::text_table::{Left, Right, paragraph, stdout_width, text_table};
+use hexad_core::control::signals::diagnostic::{DiagnosticCode, Reaction};
+use hexad_core::control::signals::limits::Limit;
+use hexad_core::control::signals::state::State;
+use hexad_machine::text::files::{print, print_json};
+use hexad_machine::text::text_table::{Left, Right, paragraph, stdout_width, text_table};
 
 #[derive(Debug, Args)]
 pub struct FaultsArguments {

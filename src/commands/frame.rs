@@ -8,16 +8,16 @@ use super::arguments::MachineFile;
 use super::failure::{CommandError, Failure};
 use super::frame_options::FrameOptions;
 use super::machine_file::{difference, with_frame, write_new};
-use crate::config::Config;
-use crate::config::frames::{FrameKind, NamedFrame};
-use crate::daemon::target_source::{Observation, TargetError};
-use crate::model::rigid::Pose;
-use crate::model::task::{pose_of, task_coordinates};
-use crate::motion::frames::Frames;
-use crate::operator::requests::status;
-use crate::output::files::print;
-use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed};
-use crate::output::text_table::{Left, Right, text_table};
+use hexad_client::operator::requests::status;
+use hexad_core::model::rigid::Pose;
+use hexad_core::model::task::{pose_of, task_coordinates};
+use hexad_core::motion::frames::Frames;
+use hexad_daemon::target_source::{Observation, TargetError};
+use hexad_machine::config::Config;
+use hexad_machine::config::frames::{FrameKind, NamedFrame};
+use hexad_machine::text::files::print;
+use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, fixed};
+use hexad_machine::text::text_table::{Left, Right, text_table};
 
 #[derive(Debug, Args)]
 pub struct FrameArguments {

@@ -3,13 +3,13 @@
 use clap::Args;
 
 use super::failure::CommandError;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::config::frames::UnknownFrames;
-use crate::model::rigid::Pose;
-use crate::model::task::task_coordinates;
-use crate::motion::rotation_order::RotationOrder;
-use crate::operator::motion_fields::FrameField;
+use hexad_client::operator::motion_fields::FrameField;
+use hexad_core::model::rigid::Pose;
+use hexad_core::model::task::task_coordinates;
+use hexad_core::motion::rotation_order::RotationOrder;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::config::frames::UnknownFrames;
 
 #[derive(Clone, Debug, Default, Args)]
 pub struct FrameOptions {

@@ -8,13 +8,13 @@ use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
 use super::motion_client::{MotionClient, MotionError};
 use super::request::machine_name;
-use crate::control::signals::state::Request;
-use crate::operator::Order;
-use crate::operator::motion_fields::HOLD;
-use crate::operator::protocol::RequestLine;
-use crate::operator::stops::stop_machine;
-use crate::output::files::print;
-use crate::realtime::stop_request::Stop;
+use hexad_client::operator::Order;
+use hexad_client::operator::motion_fields::HOLD;
+use hexad_client::operator::protocol::RequestLine;
+use hexad_client::operator::stops::stop_machine;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::state::Request;
+use hexad_machine::text::files::print;
 
 /// Longest wait for the stop at the end.
 const STOP_LIMIT: Duration = Duration::from_secs(30);
@@ -51,7 +51,7 @@ impl HoldArguments {
             stop.wait(STATUS_INTERVAL);
         }
         // The wait for this stop must not end by the signal that has caused it.
-        let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT, remote: None };
+        let order = Order::new(Request::Stop, STOP_LIMIT);
         let outcome = stop_machine(&machine, &order, &|| false);
         if !has_control {
             // Without control there is nothing to stop, unless control was taken just now.

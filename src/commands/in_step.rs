@@ -1,11 +1,11 @@
 //! Requests in step with setpoints, over the topic `command`. In simulated time such a request belongs to an
 //! instant.
 //!
-//! Operators use the control socket ([`crate::operator`]).
+//! Operators use the control socket ([`hexad_client::operator`]).
 
-use crate::control::signals::state::Request;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage, Subscriber};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage, Subscriber};
+use hexad_core::control::signals::state::Request;
 
 /// Sender of requests in step, with the daemon's status.
 pub struct Operator {

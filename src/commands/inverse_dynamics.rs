@@ -7,15 +7,15 @@ use super::arguments::{MachineFile, TableFiles};
 use super::failure::Failure;
 use super::offline_tables::{UnsolvedRows, read_trajectory, task_state, time};
 use super::progress::item_bar;
-use crate::analysis::batch;
-use crate::model::LEGS;
-use crate::model::active_forces::InverseDynamics;
-use crate::model::fidelity::Fidelity;
-use crate::model::inverse_geometry::leg_motion;
-use crate::model::joint_space::{LegDynamics, joint_space};
-use crate::model::machine::Machine;
-use crate::output::csv_table::{NumberTable, legs};
-use crate::output::csv_writer::CsvWriter;
+use hexad_core::model::LEGS;
+use hexad_core::model::active_forces::InverseDynamics;
+use hexad_core::model::fidelity::Fidelity;
+use hexad_core::model::inverse_geometry::leg_motion;
+use hexad_core::model::joint_space::{LegDynamics, joint_space};
+use hexad_core::model::machine::Machine;
+use hexad_machine::analysis::batch;
+use hexad_machine::text::csv_table::{NumberTable, legs};
+use hexad_machine::text::csv_writer::CsvWriter;
 
 #[derive(Debug, Args)]
 pub struct InverseDynamicsArguments {

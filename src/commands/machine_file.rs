@@ -16,8 +16,8 @@ use self::estimate::array;
 pub use self::estimate::{Estimate, NewNumbers, NewValue};
 pub use self::frame::with_frame;
 use super::failure::CommandError;
-use crate::config::number;
-use crate::output::files::{FileError, is_standard, write_whole};
+use hexad_machine::config::number;
+use hexad_machine::text::files::{FileError, is_standard, write_whole};
 
 mod change_comment;
 mod difference;

@@ -8,7 +8,7 @@ use clap_complete::{Shell, generate_to};
 
 use super::CommandLine;
 use super::failure::Failure;
-use crate::output::files::{FileError, print};
+use hexad_machine::text::files::{FileError, print};
 
 #[derive(Debug, Args)]
 pub struct ManualsArguments {

@@ -7,13 +7,13 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::failure::Failure;
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::inputs::SetpointKind;
-use crate::control::signals::limits::Limit;
-use crate::control::signals::state::{Request, State};
-use crate::messages::MESSAGES;
-use crate::messages::layout::{Field, Kind, Layout, Topic};
-use crate::output::files::print;
+use hexad_client::messages::MESSAGES;
+use hexad_client::messages::layout::{Field, Kind, Layout, Topic};
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::inputs::SetpointKind;
+use hexad_core::control::signals::limits::Limit;
+use hexad_core::control::signals::state::{Request, State};
+use hexad_machine::text::files::print;
 
 #[derive(Debug, Args)]
 pub struct MessagesArguments {
@@ -236,8 +236,7 @@ mod tests {
         }
         assert!(!c.contains("SETPOINT_KIND_UNKNOWN"));
         assert!(
-            c.contains("#define HEXAD_SETPOINT_SCHEMA 7u\n")
-                && c.contains("\n    uint64_t kind; /* 0: X, X'")
+            c.contains("#define HEXAD_SETPOINT_SCHEMA 7u\n") && c.contains("  uint64_t kind; /* 0: X, X'")
         );
         assert!(c.contains("static_assert(offsetof(struct hexad_setpoint, kind) == 32, \"kind\");"));
         assert!(python.contains("    topic = \"setpoint\"\n    schema = 7\n"));
@@ -247,10 +246,13 @@ mod tests {
         let structs = json["structs"].as_array().unwrap();
         let setpoint = structs.iter().find(|it| it["name"] == "hexad_setpoint").unwrap();
         assert_eq!((&setpoint["schema"], &setpoint["size"]), (&json!(7), &json!(192)));
-        let kind = &setpoint["fields"][1];
+        let fields = setpoint["fields"].as_array().unwrap();
+        let fields: Vec<_> = fields.iter().map(|field| json!([field["name"], field["offset"]])).collect();
+        let behind =
+            [("header", 0), ("kind", 32), ("x", 40), ("x_rate", 88), ("x_accel", 136), ("target_speed", 184)];
         assert_eq!(
-            (&kind["name"], &kind["type"], &kind["offset"]),
-            (&json!("kind"), &json!("u64"), &json!(32))
+            (fields, &setpoint["fields"][1]["type"]),
+            (behind.map(|field| json!(field)).to_vec(), &json!("u64"))
         );
     }
 }

@@ -23,13 +23,11 @@ use self::hold::HoldArguments;
 use self::identify::IdentifyArguments;
 use self::inverse_dynamics::InverseDynamicsArguments;
 use self::jog::JogArguments;
-use self::log::{FORMAT_VARIABLE, LogFormat};
 use self::manuals::ManualsArguments;
 use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::record::RecordArguments;
 use self::recover::RecoverArguments;
-use self::renamed_options::with_new_form;
 use self::replay::ReplayArguments;
 use self::report::ReportArguments;
 use self::request::{EngageArguments, RequestArguments, StopArguments};
@@ -37,9 +35,10 @@ use self::run::RunArguments;
 use self::status::StatusArguments;
 use self::view::ViewArguments;
 use self::workspace::WorkspaceArguments;
-use crate::control::signals::state::Request;
-use crate::output::version::VERSION;
-use crate::realtime::stop_request::Stop;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::state::Request;
+use hexad_daemon::version::VERSION;
+use hexad_machine::log::{FORMAT_VARIABLE, LogFormat};
 
 pub mod advise;
 mod arguments;
@@ -60,7 +59,6 @@ mod identify;
 pub mod in_step;
 pub mod inverse_dynamics;
 mod jog;
-pub mod log;
 mod machine_file;
 mod manuals;
 pub mod messages;
@@ -73,7 +71,6 @@ mod progress;
 mod quantity;
 mod record;
 mod recover;
-mod renamed_options;
 mod replay;
 mod report;
 mod request;
@@ -169,7 +166,7 @@ enum CommandArguments {
 impl CommandLine {
     /// The command line of this process. If it is wrong, the process ends here, with the reason.
     pub fn from_arguments() -> Self {
-        Self::try_parse().map_err(with_new_form).unwrap_or_else(|error| error.exit())
+        Self::parse()
     }
 
     /// Executes the command.

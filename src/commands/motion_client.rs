@@ -4,17 +4,19 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use super::failure::{CommandError, INTERRUPTED, default_exit_code};
-use crate::control::signals::state::State;
-use crate::operator::OperatorError;
-use crate::operator::connection::Connection;
-use crate::operator::motion_fields::HOLD;
-use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
-use crate::operator::requests::connect;
-use crate::realtime::stop_request::Stop;
+use hexad_client::operator::OperatorError;
+use hexad_client::operator::connection::Connection;
+use hexad_client::operator::motion_fields::HOLD;
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult};
+use hexad_client::operator::requests::connect;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::state::State;
 
 /// Longest wait for an answer that the daemon gives at once, and for a platform that comes to rest.
 const ANSWER_LIMIT: Duration = Duration::from_secs(5);
 const REST_LIMIT: Duration = Duration::from_secs(60);
+/// Number of the request that ends a motion.
+const REST: u64 = 1;
 
 /// Reason why a motion was not carried out.
 #[derive(Debug, thiserror::Error)]
@@ -91,13 +93,12 @@ impl<'a> MotionClient<'a> {
 
     /// Brings the platform to rest where it is.
     fn rest(&mut self) -> Result<MotionError, MotionError> {
-        self.connection.send(&RequestLine { wait: true, ..RequestLine::new(HOLD) })?;
+        self.connection.send(&RequestLine { wait: true, id: Some(REST), ..RequestLine::new(HOLD) })?;
         let until = Instant::now() + REST_LIMIT;
         let repeated = || self.stop.is_repeated();
         while let Some(answer) = self.connection.receive(until, repeated)? {
             match answer.result {
-                // Of the motion.
-                RequestResult::Superseded | RequestResult::Accepted => {}
+                _ if answer.id != Some(REST) => {}
                 RequestResult::Refused => return Ok(MotionError::InterruptedEarly),
                 RequestResult::Done => return Ok(MotionError::Interrupted),
                 _ => return completed(answer).map(|_| MotionError::Interrupted),

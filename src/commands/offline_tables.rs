@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::failure::CommandError;
 use super::orientation::OrientationFormat;
-use crate::analysis::pose_spline;
-use crate::model::task::TaskState;
-use crate::motion::trajectory::Knot;
-use crate::output::csv_table::{
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::trajectory::Knot;
+use hexad_machine::analysis::pose_spline;
+use hexad_machine::text::csv_table::{
     NumberTable, TableError, TableErrors, derivative_columns, pose_columns, six, trajectory_columns,
 };
-use crate::output::files::name_of;
+use hexad_machine::text::files::name_of;
 
 /// Error for rows without a solution. The output is complete and marks them; the error makes the failure
 /// visible.
@@ -162,8 +162,8 @@ pub fn task_state(row: &[f64]) -> TaskState {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::minimum_jerk::rise;
     use core::f64::consts::{FRAC_PI_2, PI};
+    use hexad_core::motion::minimum_jerk::rise;
 
     /// Table of a motion that begins at the angles `start`, each row with its own triple of angles.
     fn read(start: [f64; 3], triple: fn([f64; 3]) -> [f64; 3]) -> NumberTable {

@@ -2,10 +2,10 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::model::rigid::Pose;
-use crate::model::task::{TaskState, task_coordinates};
-use crate::motion::rotation_order::{RotationOrder, quaternion_of, rotation_of};
-use crate::output::csv_table::{pose_columns, six};
+use hexad_core::model::rigid::Pose;
+use hexad_core::model::task::{TaskState, task_coordinates};
+use hexad_core::motion::rotation_order::{RotationOrder, quaternion_of, rotation_of};
+use hexad_machine::text::csv_table::{pose_columns, six};
 
 /// Help text of the option.
 pub const ROTATION_HELP: &str = "Orientations in the table: an order of the rotations, as zyx for R = Rz(gamma) \

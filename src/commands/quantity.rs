@@ -2,7 +2,7 @@
 //!
 //! A number without unit is refused, because it has two likely readings. Zero needs no unit.
 
-use crate::output::units::{ANGLES, LENGTHS, Units, in_letters};
+use hexad_machine::text::units::{ANGLES, LENGTHS, Units, in_letters};
 
 /// Bounds of a length and of an angle, larger than any machine.
 const LENGTH_BOUNDS: [&str; 2] = ["-1e6m", "1e6m"];

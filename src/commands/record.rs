@@ -9,12 +9,12 @@ use clap::Args;
 
 use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
-use crate::operator::OperatorError;
-use crate::operator::connection::Connection;
-use crate::operator::protocol::{RequestLine, RequestResult};
-use crate::operator::requests::ask_first;
-use crate::output::files::{print, write_whole_with};
-use crate::realtime::file_passing;
+use hexad_client::operator::OperatorError;
+use hexad_client::operator::connection::Connection;
+use hexad_client::operator::protocol::{RequestLine, RequestResult};
+use hexad_client::operator::requests::ask_first;
+use hexad_client::realtime::file_passing;
+use hexad_machine::text::files::{print, write_whole_with};
 
 /// Longest wait for a recording of the last seconds: 160 MB on a slow disk.
 const RECORD_LIMIT: Duration = Duration::from_secs(60);

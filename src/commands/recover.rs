@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::failure::Failure;
-use crate::output::files::print;
-use crate::recording::copy::copy;
-use crate::recording::reader::Recording;
+use hexad_daemon::recording::copy::copy;
+use hexad_daemon::recording::damage_text;
+use hexad_daemon::recording::reader::{Recording, Summary};
+use hexad_machine::text::files::print;
 
 #[derive(Debug, Args)]
 pub struct RecoverArguments {
@@ -24,14 +25,19 @@ impl RecoverArguments {
         let recording = Recording::open(&self.recording)?;
         let summary = recording.summary()?;
         let output = self.output.as_ref().unwrap_or(&self.recording);
-        let Some(why) = summary.unfinished else {
+        let Summary { unfinished, damage, cycles, .. } = summary;
+        let damaged = (!damage.is_empty())
+            .then(|| format!("damaged (cycles of these times are left out): {}", damage_text(&damage)));
+        let lost: Vec<_> =
+            damaged.into_iter().chain(unfinished.map(|why| format!("the rest is lost: {why}"))).collect();
+        if lost.is_empty() {
             return Ok(print(format_args!("{}: it is complete\n", self.recording.display()))?);
-        };
+        }
         let messages = copy(&recording, output, 0..=u64::MAX)?;
         Ok(print(format_args!(
-            "{}: {} cycles, {messages} messages; the rest is lost: {why}\n",
+            "{}: {cycles} cycles, {messages} messages; {}\n",
             output.display(),
-            summary.cycles
+            lost.join("; ")
         ))?)
     }
 }

@@ -8,15 +8,15 @@ use clap::Args;
 use fearless_simd::Level;
 
 use super::failure::{CommandError, Failure};
-use crate::config::Config;
-use crate::daemon::recorder::instruction_set;
-use crate::daemon::replay::{Replay, other_controller, recorded_config, recorded_controller, replay};
-use crate::model::machine::at_most_256_bits;
-use crate::output::files::print;
-use crate::output::version::VERSION;
-use crate::recording::copy::copy;
-use crate::recording::reader::{Recording, Summary};
-use crate::recording::{Item, RunInfo};
+use hexad_core::model::machine::at_most_256_bits;
+use hexad_daemon::recorder::instruction_set;
+use hexad_daemon::recording::copy::copy;
+use hexad_daemon::recording::reader::{Recording, Summary};
+use hexad_daemon::recording::{Item, RunInfo};
+use hexad_daemon::replay::{Replay, other_controller, recorded_config, recorded_controller, replay};
+use hexad_daemon::version::{self, VERSION};
+use hexad_machine::config::Config;
+use hexad_machine::text::files::print;
 
 /// Largest number of ranges of cycles that are listed.
 const MAX_RANGES: usize = 10;
@@ -88,6 +88,7 @@ impl ReplayArguments {
             None => recorded_controller(&info, &recorded),
         };
         let (summary, replay) = replay(&recording, controller)?;
+        recording.remark(&summary);
         print(description(&recording, &summary, &replay, other.as_ref().unwrap_or(&recorded)))?;
         if replay.compared == 0 {
             return Err(ReplayError::Unknown(recorded_version(&info)).into());
@@ -113,7 +114,9 @@ fn processor() -> Level {
 
 /// Range of `log_time` \[ns\] of a part, extended to the point where a replay can begin.
 fn times_of(recording: &Recording, part: &RangeInclusive<f64>) -> Result<RangeInclusive<u64>, Failure> {
-    let Summary { first, info, .. } = recording.summary()?;
+    let summary = recording.summary()?;
+    recording.remark(&summary);
+    let Summary { first, info, .. } = summary;
     let (mut begin, mut end, mut repeatable, mut length_s) = (None, None, None, 0.0);
     recording.each(|item| match item {
         Item::Memory { cycle, .. } => repeatable = Some(cycle),
@@ -136,7 +139,7 @@ fn times_of(recording: &Recording, part: &RangeInclusive<f64>) -> Result<RangeIn
 }
 
 fn description(recording: &Recording, summary: &Summary, replay: &Replay, config: &Config) -> String {
-    let Summary { info, first, cycles, unfinished, .. } = summary;
+    let Summary { info, first, cycles, .. } = summary;
     let mut text = format!(
         "{}: {}, {cycles} cycles from number {}, hexad {}, {}, {}\n",
         recording.path().display(),
@@ -146,14 +149,11 @@ fn description(recording: &Recording, summary: &Summary, replay: &Replay, config
         info.instruction_set,
         info.fidelity,
     );
-    if let Some(why) = unfinished {
-        let _ = writeln!(text, "the file is not complete ({why}); `hexad recover` makes it so");
-    }
     let [here, used] = [processor(), config.machine.level].map(instruction_set);
     if info.instruction_set != here {
         let _ = writeln!(text, "the instruction set is another one here: {here}; computed with {used}");
     }
-    if [info.version.as_str(), &info.commit] != [env!("CARGO_PKG_VERSION"), env!("HEXAD_COMMIT")] {
+    if [info.version.as_str(), &info.commit] != [version::NUMBER, version::COMMIT] {
         let _ = writeln!(text, "the version is another one here: hexad {VERSION}");
     }
     if !replay.unknown.is_empty() {

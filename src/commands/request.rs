@@ -12,14 +12,14 @@ use tracing::info;
 
 use super::arguments::{MachineFile, OptionalMachineFile, duration};
 use super::failure::Failure;
-use crate::config::ConfigError;
-use crate::config::machine_name::name_in;
-use crate::control::signals::state::Request;
-use crate::operator::requests::{self, carry_out};
-use crate::operator::stops::{Stopped, Target, stop};
-use crate::operator::{OperatorError, Order};
-use crate::output::files::print;
-use crate::realtime::stop_request::Stop;
+use hexad_client::operator::requests::{self, carry_out};
+use hexad_client::operator::stops::{Stopped, Target, stop};
+use hexad_client::operator::{OperatorError, Order};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::state::Request;
+use hexad_machine::config::ConfigError;
+use hexad_machine::config::machine_name::name_in;
+use hexad_machine::text::files::print;
 
 #[derive(Debug, Args)]
 pub struct RequestArguments {
@@ -49,6 +49,9 @@ pub struct EngageArguments {
     /// Wait for measurements and for a setpoint at the pose of the platform, instead of being refused
     #[arg(long)]
     wait: bool,
+    /// Pose of the platform, by its number in a refusal that lists several with the measured lengths
+    #[arg(long)]
+    pose: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -65,19 +68,19 @@ pub struct StopArguments {
 impl EngageArguments {
     /// Takes control.
     pub fn execute(&self) -> Result<(), Failure> {
-        self.request.send(Request::Engage, self.wait)
+        self.request.send(Request::Engage, self.wait, self.pose)
     }
 }
 
 impl RequestArguments {
     /// Sends a request other than a stop.
     pub fn execute(&self, request: Request) -> Result<(), Failure> {
-        self.send(request, false)
+        self.send(request, false, None)
     }
 
-    fn send(&self, request: Request, is_patient: bool) -> Result<(), Failure> {
+    fn send(&self, request: Request, is_patient: bool, pose: Option<u32>) -> Result<(), Failure> {
         let (machine, stop) = (machine_name(self.machine.path())?, Stop::on_signals()?);
-        let order = Order { request, is_patient, timeout: self.wait.limit(), remote: None };
+        let order = Order { is_patient, pose, ..Order::new(request, self.wait.limit()) };
         let waits = |reason: &str| eprintln!("hexad: waiting: {reason}");
         let state = carry_out(&machine, &order, &|| stop.is_requested(), waits)?;
         Ok(print(format_args!("{state}\n"))?)
@@ -101,7 +104,7 @@ impl StopArguments {
             None if self.all || request == Request::Estop => Target::All,
             None => Target::Only,
         };
-        let order = Order { request, is_patient: false, timeout: self.wait.limit(), remote: None };
+        let order = Order::new(request, self.wait.limit());
         let stopped = stop(target, &order, &|| interrupted.is_requested())?;
         report(stopped, matches!(target, Target::All))
     }

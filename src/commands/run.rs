@@ -6,10 +6,9 @@ use clap::{Args, value_parser};
 
 use super::arguments::MachineFile;
 use super::failure::Failure;
-use crate::daemon;
-use crate::daemon::recorder::Folders;
-use crate::daemon::recorder::folder::Bounds;
-use crate::realtime::stop_request::Stop;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_daemon::recorder::Folders;
+use hexad_daemon::recorder::folder::Bounds;
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -45,7 +44,7 @@ impl RunArguments {
         let bounds = Bounds { file: record_file_mib << 20, total: record_total_mib << 20 };
         let folders = Folders { record, faults, bounds };
         let (config, stop) = (machine.load()?, Stop::on_signals()?);
-        daemon::run(&config, &daemon::Files { report, histogram, folders, state }, &stop)?;
+        hexad_daemon::run(&config, &hexad_daemon::Files { report, histogram, folders, state }, &stop)?;
         Ok(())
     }
 }

@@ -1,12 +1,16 @@
 //! The generic cyclic loop with the controller's input and output.
 
-use crate::control::controller::Output;
-use crate::control::signals::inputs::Input;
-use crate::control::signals::state::{MessageId, OperatorRequest, Request, State};
-use crate::messages::{CycleMessage, MAX_REQUEST_AGE_NS};
-use crate::realtime::cyclic::{self, CyclicInput};
-use crate::realtime::exchange;
-use crate::realtime::request_word;
+use core::sync::atomic::AtomicBool;
+
+use heapless::spsc::Producer;
+use hexad_client::messages::{CycleMessage, MAX_REQUEST_AGE_NS};
+use hexad_client::realtime::clock::Clock;
+use hexad_client::realtime::cyclic::{self, CyclicTask, LoopReport, Release, Timing};
+use hexad_client::realtime::exchange;
+use hexad_client::realtime::request_word;
+use hexad_core::control::controller::Output;
+use hexad_core::control::signals::inputs::Input;
+use hexad_core::control::signals::state::{MessageId, OperatorRequest, Request, State};
 
 /// One cycle of the controller, for statistics and log.
 pub type CycleRecord = cyclic::CycleRecord<Input, Output>;
@@ -19,15 +23,37 @@ pub type IoSide = exchange::IoSide<Input, Output>;
 /// The real-time thread's ends of the exchange with the I/O thread.
 pub type RealtimeSide = exchange::RealtimeSide<Input, Output>;
 
-impl CyclicInput for Input {
-    fn begin_cycle(&mut self, release_ns: u64, clock_ns: u64, deadline_missed: bool) {
-        (self.release_ns, self.overrun_is_fault) = (release_ns, deadline_missed);
-        self.clock_offset_ns = release_ns.wrapping_sub(clock_ns) as i64;
+/// The controller's step as the task of the loop: it is called with the input, to which it may add, and with the instant at
+/// which the cycle woke \[ns\].
+struct ControllerTask<S>(S);
+
+impl<S: FnMut(&mut Input, u64) -> Output> CyclicTask for ControllerTask<S> {
+    type Input = Input;
+    type Output = Output;
+
+    fn measured_ns(input: &Input) -> Option<u64> {
+        input.measurement.map(|measurement| measurement.time_ns)
     }
 
-    fn measured_ns(&self) -> Option<u64> {
-        self.measurement.map(|measurement| measurement.time_ns)
+    fn run_cycle(&mut self, input: &mut Input, release: &Release) -> Output {
+        let Release { release_ns, clock_ns, woke_ns, deadline_missed } = *release;
+        (input.release_ns, input.overrun_is_fault) = (release_ns, deadline_missed);
+        input.clock_offset_ns = release_ns.wrapping_sub(clock_ns) as i64;
+        (self.0)(input, woke_ns)
     }
+}
+
+/// [`cyclic::run`] with the step of a controller. A test may burn time in it.
+pub fn run(
+    clock: &mut impl Clock,
+    timing: &Timing,
+    step: impl FnMut(&mut Input, u64) -> Output,
+    last: Output,
+    side: RealtimeSide,
+    records: Producer<'_, CycleRecord>,
+    stop: &AtomicBool,
+) -> LoopReport {
+    cyclic::run(clock, timing, ControllerTask(step), last, side, records, stop)
 }
 
 /// Epoch of a request from the control socket or a signal; no publisher has it. The sequence of the request
@@ -106,7 +132,7 @@ pub fn message(record: &CycleRecord) -> CycleMessage {
 
 /// Age of the measurement at the release \[ns\], if there is one.
 pub fn measured_age_ns(record: &CycleRecord) -> Option<u64> {
-    record.input.measured_ns().map(|time_ns| record.input.release_ns.saturating_sub(time_ns))
+    record.input.measurement.map(|measured| record.input.release_ns.saturating_sub(measured.time_ns))
 }
 
 /// Norms of the tracking error while active \[m\], \[rad\].
@@ -118,7 +144,7 @@ pub fn tracking_error(record: &CycleRecord) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::realtime::request_word::RequestWord;
+    use hexad_client::realtime::request_word::RequestWord;
 
     const NOW_NS: u64 = 5_000_000_000;
 

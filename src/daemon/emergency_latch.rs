@@ -14,14 +14,14 @@ use std::sync::Arc;
 
 use tracing::{error, info};
 
-use crate::control::controller::Output;
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::state::State;
-use crate::messages::clock::monotonic_ns;
-use crate::output::files::{FileError, write_whole};
-use crate::realtime::clock::Monotonic;
-use crate::realtime::event::Event;
-use crate::realtime::triple_buffer::{Reader, Writer, triple_buffer};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::realtime::clock::Monotonic;
+use hexad_client::realtime::event::Event;
+use hexad_client::realtime::triple_buffer::{Reader, Writer, triple_buffer};
+use hexad_core::control::controller::Output;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::State;
+use hexad_machine::text::files::{FileError, write_whole};
 
 /// Name of the file in the state directory.
 const FILE: &str = "emergency-stop";

@@ -12,21 +12,21 @@ use heapless::spsc::Consumer;
 use tracing::{error, info, warn};
 
 use super::cycle::{CycleRecord, message, tracking_error};
-use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
+use super::pose_search::PoseSearch;
 use super::process_names::sentence;
 use super::recorder::Recorded;
 use super::reload::Loaded;
 use super::reload::handover::{Answer, Offer};
 use super::report::{Fault, TrackingSum};
 use super::statistics::Collector;
-use crate::control::controller::Output;
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::inputs::{Input, Publishers};
-use crate::control::signals::state::State;
-use crate::messages::StatisticsMessage;
-use crate::realtime::triple_buffer::Writer;
-use crate::realtime::usage::ThreadUsage;
+use hexad_client::messages::StatisticsMessage;
+use hexad_client::realtime::triple_buffer::Writer;
+use hexad_client::realtime::usage::ThreadUsage;
+use hexad_core::control::controller::Output;
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::inputs::{Input, Publishers};
+use hexad_core::control::signals::state::State;
 
 /// Interval at which the queues are emptied. They are not nearly full after it, even at the highest rate.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -55,7 +55,7 @@ pub struct LogLinks<'a, 'o> {
     /// Offers that the real-time thread has answered. They return to the reload thread.
     pub answers: Consumer<'a, &'o mut Offer>,
     pub returned: Sender<&'o mut Offer>,
-    pub first_pose: FirstPose,
+    pub pose_search: PoseSearch,
 }
 
 /// Statistics of a run.
@@ -112,8 +112,8 @@ impl<'o> Log<'o> {
             self.collector.add(&record);
             self.return_offer(links, record.cycle);
             self.record(links, &record);
+            links.pose_search.add(&record);
             links.passed_on.store(record.cycle, Ordering::Relaxed);
-            links.first_pose.add(&record);
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);
             }

@@ -5,7 +5,7 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::control::controller::Memory;
+use hexad_core::control::controller::Memory;
 
 /// Length of the queue; one place always remains free.
 const LENGTH: usize = 2;

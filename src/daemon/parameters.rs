@@ -4,19 +4,19 @@ use core::f64::consts::TAU;
 
 use nalgebra::Vector6;
 
-use crate::config::Config;
-use crate::config::control_loops::longest_age_s;
-use crate::config::deployment::Deployment;
-use crate::control::constants::Constants;
-use crate::control::law::Law;
-use crate::control::law::estimator::ReadingErrors;
-use crate::control::law::estimator::covariance::NoiseModel;
-use crate::control::law::gains::Gains;
-use crate::control::parameters::{Envelope, Parameters};
-use crate::control::signals::pair::Pair;
-use crate::model::fidelity::Fidelity;
-use crate::model::machine::Machine;
-use crate::realtime::cyclic::{ReleaseMode, Timing};
+use hexad_client::realtime::cyclic::{ReleaseMode, Timing};
+use hexad_core::control::constants::Constants;
+use hexad_core::control::law::Law;
+use hexad_core::control::law::estimator::ReadingErrors;
+use hexad_core::control::law::estimator::covariance::NoiseModel;
+use hexad_core::control::law::gains::Gains;
+use hexad_core::control::parameters::{Envelope, Parameters};
+use hexad_core::control::signals::pair::Pair;
+use hexad_core::model::fidelity::Fidelity;
+use hexad_core::model::machine::Machine;
+use hexad_machine::config::Config;
+use hexad_machine::config::control_loops::longest_age_s;
+use hexad_machine::config::deployment::Deployment;
 
 /// Constants of the controller, for motions of its reference, which do not depend on the fidelity.
 pub fn constants(config: &Config) -> Constants {

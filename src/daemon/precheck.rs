@@ -10,20 +10,20 @@ use core::ops::ControlFlow;
 use nalgebra::Vector6;
 
 use super::parameters::parameters;
-use crate::config::Config;
-use crate::control::constants::Constants;
-use crate::control::parameters::{Envelope, Parameters};
-use crate::control::reference::ReferenceGenerator;
-use crate::control::setpoint::motion::SetpointMotion;
-use crate::control::setpoint::target::Target;
-use crate::control::setpoint::validation::{check_deviation, check_setpoint};
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::inputs::Setpoint;
-use crate::control::signals::limits::{Limit, LimitSet};
-use crate::model::fidelity::Fidelity;
-use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::Machine;
-use crate::model::task::TaskState;
+use hexad_core::control::constants::Constants;
+use hexad_core::control::parameters::{Envelope, Parameters};
+use hexad_core::control::reference::ReferenceGenerator;
+use hexad_core::control::setpoint::motion::SetpointMotion;
+use hexad_core::control::setpoint::target::Target;
+use hexad_core::control::setpoint::validation::{check_deviation, check_setpoint};
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::inputs::Setpoint;
+use hexad_core::control::signals::limits::{Limit, LimitSet};
+use hexad_core::model::fidelity::Fidelity;
+use hexad_core::model::kinematic_state::KinematicState;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::task::TaskState;
+use hexad_machine::config::Config;
 
 /// Share of each limit that a built-in motion may use. The rest is a reserve, because a cycle may begin at any instant
 /// between two setpoints.
@@ -79,18 +79,19 @@ impl<'a> Precheck<'a> {
             first = Some(refusal);
             ControlFlow::Break(())
         };
-        self.follow(at, span, refused, |_| ());
+        self.follow(at, span, refused, |_| true);
         first
     }
 
     /// Follows the trajectory from `from` to `to`. After a refusal it continues from the refused setpoint,
-    /// unless `refused` breaks. `progress` receives the time since the beginning \[s\].
+    /// unless `refused` breaks. `progress` receives the time since the beginning \[s\] and says
+    /// whether to go on.
     pub fn follow(
         &self,
         at: impl Fn(f64) -> TaskState,
         [from, to]: [f64; 2],
         mut refused: impl FnMut(SetpointRefusal) -> ControlFlow<()>,
-        mut progress: impl FnMut(f64),
+        mut progress: impl FnMut(f64) -> bool,
     ) {
         let constants = Constants::new(self.machine, self.parameters);
         let period_ns = self.parameters.period_ns;
@@ -102,8 +103,8 @@ impl<'a> Precheck<'a> {
         reference.begin_placed_motion(0);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
         for k in 0..=steps {
-            if k % CYCLES_PER_REPORT == 0 {
-                progress(self.time(0.0, k));
+            if k % CYCLES_PER_REPORT == 0 && !progress(self.time(0.0, k)) {
+                break;
             }
             let mut active_limits = LimitSet::default();
             let result = check_setpoint(self.machine, &self.parameters, &now, &mut active_limits)

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::control::signals::diagnostic::{Comparison, Diagnostic};
+use hexad_core::control::signals::diagnostic::{Comparison, Diagnostic};
 
 /// Command of a process; empty if it has ended.
 pub fn command(process_id: u32) -> String {
@@ -37,7 +37,7 @@ pub fn named(process_id: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::signals::diagnostic::DiagnosticCode;
+    use hexad_core::control::signals::diagnostic::DiagnosticCode;
 
     #[test]
     fn a_process_that_was_not_waited_for_has_ended() {

@@ -1,9 +1,9 @@
 //! Change of the rate of a motion's own time, from one to zero or back. So the platform comes to rest, and
 //! continues, on the path that was checked.
 
-use crate::control::signals::limits::{DerivativeLimits, Limits};
-use crate::model::task::TaskState;
-use crate::motion::minimum_jerk::{Profile, rise};
+use hexad_core::control::signals::limits::{DerivativeLimits, Limits};
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::minimum_jerk::{Profile, rise};
 
 /// Shortest change \[s\], factor to the next longer one, and number of candidates: up to half a minute.
 const SHORTEST_S: f64 = 0.1;

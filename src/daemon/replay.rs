@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 
 use fearless_simd::Level;
 
-use crate::config::{Config, ConfigError, fidelity};
-use crate::control::controller::Controller;
-use crate::daemon::parameters;
-use crate::messages::CycleMessage;
-use crate::messages::layout::Declared as _;
-use crate::model::fidelity::Fidelity;
-use crate::realtime::setup::denormals;
+use crate::parameters;
 use crate::recording::reader::{Recording, Summary};
 use crate::recording::{Item, RecordingError, RunInfo, memory_from};
+use hexad_client::messages::CycleMessage;
+use hexad_client::messages::layout::Declared as _;
+use hexad_client::realtime::setup::denormals;
+use hexad_core::control::controller::Controller;
+use hexad_core::model::fidelity::Fidelity;
+use hexad_machine::config::{Config, ConfigError, fidelity};
 
 /// Relative rounding of a determinant of six rows: a few roundings per factor.
 const DETERMINANT_ROUNDING: f64 = 32.0 * f64::EPSILON;

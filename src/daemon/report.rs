@@ -8,13 +8,13 @@ use tracing::{info, warn};
 use super::io_thread::IoReport;
 use super::log_thread::LogReport;
 use super::recorder::RecorderReport;
-use crate::config::Config;
-use crate::messages::{StatisticsMessage, Times, WorstCycle};
-use crate::output::files::{FileError, write_whole};
-use crate::output::version::VERSION;
-use crate::realtime::cyclic::LoopReport;
-use crate::realtime::setup::deadline;
-use crate::realtime::usage::ThreadUsage;
+use crate::version::VERSION;
+use hexad_client::messages::{StatisticsMessage, Times, WorstCycle};
+use hexad_client::realtime::cyclic::LoopReport;
+use hexad_client::realtime::setup::deadline;
+use hexad_client::realtime::usage::ThreadUsage;
+use hexad_machine::config::Config;
+use hexad_machine::text::files::{FileError, write_whole};
 
 /// Report of a run: timing, tracking, resources and faults.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -84,7 +84,7 @@ pub struct Tracking {
 pub struct Fault {
     /// Number of the cycle that entered the fault, from 1.
     pub cycle: u64,
-    /// Number of the [`DiagnosticCode`](crate::control::signals::diagnostic::DiagnosticCode).
+    /// Number of the [`DiagnosticCode`](hexad_core::control::signals::diagnostic::DiagnosticCode).
     pub number: u32,
     /// Name of that code, in words.
     pub name: String,

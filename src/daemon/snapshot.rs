@@ -1,9 +1,9 @@
 //! Snapshot of the daemon for the control thread, written by the I/O thread after each cycle.
 
-use crate::control::signals::diagnostic::Diagnostic;
-use crate::control::signals::inputs::{Measurement, Publishers, Setpoint};
-use crate::messages::{LoopTimes, Rejection, StatusMessage};
-use crate::model::LEGS;
+use hexad_client::messages::{LoopTimes, Rejection, StatusMessage};
+use hexad_core::control::signals::diagnostic::Diagnostic;
+use hexad_core::control::signals::inputs::{Measurement, Publishers, Setpoint};
+use hexad_core::model::LEGS;
 
 /// Newest published cycle, with its inputs.
 #[derive(Clone, Copy, Debug, Default)]

@@ -9,16 +9,16 @@ use std::sync::mpsc;
 use tracing::warn;
 
 use super::{DaemonError, nanoseconds};
-use crate::config::deployment::{Realtime, Scheduler};
-use crate::control::controller::Controller;
-use crate::control::signals::inputs::{Input, Measurement, Setpoint};
-use crate::model::inverse_geometry::leg_lengths;
-use crate::model::machine::Machine;
-use crate::model::task::TaskState;
-use crate::realtime::cyclic::ReleaseMode;
-use crate::realtime::setup::deadline::Reservation;
-use crate::realtime::setup::idle::PmQosRequest;
-use crate::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
+use hexad_client::realtime::cyclic::ReleaseMode;
+use hexad_client::realtime::setup::deadline::Reservation;
+use hexad_client::realtime::setup::idle::PmQosRequest;
+use hexad_client::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
+use hexad_core::control::controller::Controller;
+use hexad_core::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad_core::model::inverse_geometry::leg_lengths;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::task::TaskState;
+use hexad_machine::config::deployment::{Realtime, Scheduler};
 
 /// Cycles computed before the first release, to load code and data into memory and cache.
 const WARM_UP_CYCLES: u32 = 1000;
@@ -82,7 +82,7 @@ pub(super) fn prepare_support(realtime: &Realtime, priority: i32) {
 
 /// Prepares the calling thread for the loop. The warm-up runs before SCHED_DEADLINE, because it would use up
 /// the budget.
-pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {
+pub fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {
     denormals::flush();
     warm_up();
     let scheduled = match realtime.scheduler {

@@ -4,7 +4,7 @@
 use super::cycle::{CycleRecord, measured_age_ns};
 use super::hints::Hints;
 use super::time_histogram::TimeHistogram;
-use crate::messages::{LoopTimes, StatisticsMessage, WORST_CYCLES, WorstCycle};
+use hexad_client::messages::{LoopTimes, StatisticsMessage, WORST_CYCLES, WorstCycle};
 
 /// Histograms of one interval.
 #[derive(Debug, Default)]
@@ -122,7 +122,7 @@ impl Collector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::signals::inputs::{Input, Measurement};
+    use hexad_core::control::signals::inputs::{Input, Measurement};
 
     fn record(cycle: u64, wakeup_ns: u64) -> CycleRecord {
         let measurement = Some(Measurement { time_ns: 11, ..Measurement::default() });

@@ -12,12 +12,12 @@ use tracing::{error, warn};
 
 use super::REALTIME_THREAD;
 use super::reload::Requester;
-use crate::control::controller::Output;
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::state::State;
-use crate::messages::Remains;
-use crate::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
-use crate::realtime::stop_request::Hangups;
+use hexad_client::messages::Remains;
+use hexad_client::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
+use hexad_client::realtime::stop_request::Hangups;
+use hexad_core::control::controller::Output;
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::state::State;
 
 /// Interval between two checks of progress, much shorter than the timeout of any watchdog.
 pub const SUPERVISION_INTERVAL: Duration = Duration::from_millis(100);

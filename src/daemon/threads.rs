@@ -13,15 +13,17 @@ use tracing::{info, warn};
 
 use super::control_socket::location::ControlSocket;
 use super::control_socket::{self, ControlLinks};
-use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
+use super::cycle::{self, CycleRecord, RealtimeSide, RequestIntake};
 use super::emergency_latch::{EmergencyLatch, latch_link};
-use super::first_pose::FirstPose;
+use super::end_watch::end_watch;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
 use super::log_thread::{self, LogLinks, LogReport};
 use super::memory_queue::{MemoryProducer, MemoryQueue};
 use super::motion_requests;
 use super::parameters::{nanoseconds, timing};
+use super::pose_gate::{PoseGate, PoseWatch};
+use super::pose_search::PoseSearch;
 use super::recorder::{Folders, Recorder, RecorderReport};
 use super::reload::handover::{Handover, Offer, OfferQueue};
 use super::reload::io_parameters::IoParametersInForce;
@@ -34,20 +36,20 @@ use super::start::{
 };
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
-use crate::config::Config;
-use crate::control::controller::{Controller, Output};
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::inputs::Input;
-use crate::messages::StatisticsMessage;
-use crate::realtime::clock::Monotonic;
-use crate::realtime::cyclic::{self, LoopReport, RECORDS, ReleaseMode};
-use crate::realtime::event::Event;
-use crate::realtime::exchange::exchange;
-use crate::realtime::process::block_signals;
-use crate::realtime::request_word::RequestWord;
-use crate::realtime::setup::memory;
-use crate::realtime::stop_request::Stop;
-use crate::realtime::triple_buffer::triple_buffer;
+use hexad_client::messages::StatisticsMessage;
+use hexad_client::realtime::clock::Monotonic;
+use hexad_client::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode};
+use hexad_client::realtime::event::Event;
+use hexad_client::realtime::exchange::exchange;
+use hexad_client::realtime::process::block_signals;
+use hexad_client::realtime::request_word::RequestWord;
+use hexad_client::realtime::setup::memory;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_client::realtime::triple_buffer::triple_buffer;
+use hexad_core::control::controller::{Controller, Output};
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::inputs::Input;
+use hexad_machine::config::Config;
 
 /// Stack of each thread: twice the size used, and small because all of it is locked. The recorder uses most:
 /// 495 KB if the crate is one codegen unit, 555 KB with several (2026-11-25). Unoptimized code keeps every
@@ -118,6 +120,8 @@ pub(super) fn run(
     let ((io_ready, ready), (go, go_ahead)) = (channel(), channel());
     memory::keep_heap();
 
+    let gate = Arc::new(PoseGate::new());
+    let may_hold_loop = config.deployment.realtime.release == ReleaseMode::Lockstep;
     let log_links = LogLinks {
         records,
         delays,
@@ -125,16 +129,17 @@ pub(super) fn run(
         files,
         recorder: recorder_links.cycles,
         passed_on: &flags.passed_on,
-        may_hold_loop: config.deployment.realtime.release == ReleaseMode::Lockstep,
+        may_hold_loop,
         answers,
         returned: return_offer,
-        first_pose: FirstPose::of(&config.machine),
+        pose_search: PoseSearch::new(&config.machine, gate.clone(), may_hold_loop),
     };
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
         records: record_producer,
         memories: MemoryProducer::new(memory_producer),
         word,
+        watch: PoseWatch::new(gate.clone()),
         handover: Handover::new(offers, answer_producer, io_parameters),
         progress,
         files,
@@ -152,12 +157,14 @@ pub(super) fn run(
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
         passed_on: &flags.passed_on,
+        gate: gate.clone(),
         progress,
     };
     let control_links = ControlLinks {
         socket,
         snapshots,
         word,
+        gate,
         request_reload: request_reload.clone(),
         reloaded,
         windows: recorder_links.orders,
@@ -167,7 +174,8 @@ pub(super) fn run(
     };
     let reload_links =
         ReloadLinks { requests: reload_requests, results: reload_results, offers: offer_producer, returned };
-    scope(|threads| {
+    let mut ending = None;
+    let outcome = scope(|threads| {
         // Ends the other threads also if a thread cannot be started.
         let _stop_all = StopOnDrop(flags);
         let realtime = &config.deployment.realtime;
@@ -202,6 +210,7 @@ pub(super) fn run(
             supervise(config, flags, progress, &request_reload, stop);
         }
         drop((go, request_reload));
+        ending = end_watch();
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
         flags.stop_latch.store(true, Ordering::Relaxed);
@@ -209,7 +218,9 @@ pub(super) fn run(
         let recorded = recorder.join().map_err(|_| DaemonError::Died("recorder"));
         let (cyclic, io, log) = reports?;
         Ok(report(config, &cyclic, &io, log, recorded?))
-    })
+    });
+    drop(ending);
+    outcome
 }
 
 /// The report of a run, and the histograms as CSV.
@@ -232,6 +243,8 @@ struct RealtimeLinks<'a, 'o> {
     memories: MemoryProducer<'a>,
     /// Request word of the control thread and of signals.
     word: &'static RequestWord,
+    /// Other poses in which the platform may be.
+    watch: PoseWatch,
     /// Offers of new constants.
     handover: Handover<'a, 'o>,
     /// Progress, for the main thread.
@@ -260,17 +273,20 @@ fn run_realtime(
     links.go_ahead.recv().ok()?;
     let (word, progress, mut intake) =
         (links.word, links.progress, RequestIntake::new(realtime.is_simulated()));
-    let (mut handover, mut memories) = (links.handover, links.memories);
+    let (mut handover, mut memories, mut watch) = (links.handover, links.memories, links.watch);
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();
         handover.begin_cycle(&mut controller, woke_ns);
         memories.begin_cycle(controller.memory());
         input.request = intake.next(input.request, word.load(), woke_ns);
-        controller.step(input)
+        watch.begin_cycle(input);
+        let output = controller.step(input);
+        watch.end_cycle(input.release_ns, output.platform.map(|platform| platform.pose));
+        output
     };
     let last = Output { diagnostic: DiagnosticCode::DaemonEnding.into(), ..Output::default() };
     let timing = timing(&config.deployment);
-    Some(cyclic::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
+    Some(cycle::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
 }
 
 /// Body of the I/O thread; `None` if its ports could not be opened.

@@ -2,7 +2,7 @@
 
 use hdrhistogram::Histogram;
 
-use crate::messages::Times;
+use hexad_client::messages::Times;
 
 /// Longest time of the histogram \[ns\]. Longer times are counted as this one.
 const LONGEST_NS: u64 = 60_000_000_000;

@@ -6,7 +6,7 @@ use core::ops::Range;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
 use plotters::prelude::*;
 
-use crate::output::numbers::fixed;
+use hexad_machine::text::numbers::fixed;
 
 /// Values whose span is a smaller share of their size are constant: numbers of four bytes have seven digits.
 const FLAT_SHARE: f64 = 1e-6;

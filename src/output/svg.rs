@@ -1,7 +1,7 @@
 //! What all pictures have in common: sizes, colours that are readable on light and dark pages, text whose layout does
 //! not depend on the installed fonts.
 
-use crate::output::files::{FileError, write_whole};
+use hexad_machine::text::files::{FileError, write_whole};
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::prelude::*;

@@ -1,6 +1,8 @@
 //! The scorer sees each violation, and none where there is none: a platform that is driven beyond a limit on purpose,
 //! references that leave theirs, and whole searches against controllers that are wrong on purpose.
 
+use std::time::Duration;
+
 use hexad::control::controller::Output;
 use hexad::control::parameters::{Envelope, Parameters};
 use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -16,13 +18,14 @@ use hexad::motion::minimum_jerk::{rise, straight_move};
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
 
-use super::common::extremes::{Extremes, Quantity};
-use super::common::observed::{Observed, STEP_S};
-use super::common::rig::parameters;
-use super::common::{deployed, machine};
-use super::machines::MACHINES;
-use super::run::Faults;
-use super::search::Search;
+use hexad_support::extremes::{Extremes, Quantity};
+use hexad_support::rig::{Rig, STEP_S, parameters};
+use hexad_support::search::climb::Search;
+use hexad_support::search::genome::Genome;
+use hexad_support::search::machines::MACHINES;
+use hexad_support::search::property::{PROPERTIES, place};
+use hexad_support::search::run::{Doctor, Faults, run};
+use hexad_support::{deployed, machine};
 
 /// Axes of X.
 const ALPHA: usize = 0;
@@ -60,7 +63,7 @@ impl Driven {
         let config = deployed("motion_base");
         let mut parameters = parameters(&config);
         change(&config.machine, &mut parameters);
-        let mut observed = Observed::with(&config, &config.machine, parameters);
+        let mut observed = Rig::metered(&config, &config.machine, parameters);
         let period_s = observed.period_s();
         while observed.time_s() < self.duration_s {
             let released_s = observed.time_s() + 0.5 * period_s;
@@ -69,9 +72,9 @@ impl Driven {
             let mut expected = self.task(&config.machine, released_s + period_s).motion();
             reference(&mut expected);
             let output = Output { state: State::Engaging, force, ..Output::default() };
-            observed.apply_with(&output, Some(expected));
+            observed.apply(&output, Some(expected));
         }
-        observed.meter.extremes
+        observed.meter().extremes
     }
 
     fn assert_seen(&self, quantity: Quantity, change: impl Fn(&Machine, &mut Parameters)) {
@@ -171,22 +174,22 @@ fn too_large_a_condition_is_seen() {
 #[test]
 fn the_end_of_a_stroke_is_seen() {
     let config = deployed("motion_base");
-    let mut observed = Observed::new(&config);
+    let mut observed = Rig::metered(&config, &config.machine, parameters(&config));
     let task =
         TaskState { xdd: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0].into(), ..TaskState::at_rest(config.machine.home) };
     let force = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
     let output = Output { state: State::Active, force, ..Output::default() };
     let mut before = f64::NEG_INFINITY;
-    while observed.meter.impact_m_s.is_none() {
+    while observed.meter().impact_m_s.is_none() {
         assert!(before <= 1.0, "beyond the stroke without an end stop: {before}");
         assert!(observed.time_s() < 10.0, "no end stop");
-        observed.apply(&output);
-        before = observed.meter.extremes.of(Quantity::Stroke).min(1.0);
+        observed.apply(&output, output.reference);
+        before = observed.meter().extremes.of(Quantity::Stroke).min(1.0);
     }
-    let speed = observed.meter.impact_m_s.unwrap();
+    let speed = observed.meter().impact_m_s.unwrap();
     assert!(speed > 0.3, "{speed}");
-    assert!((observed.meter.extremes.of(Quantity::Stroke) - 1.001 - speed).abs() < 1e-12);
-    assert!(observed.meter.extremes.violations().iter().any(|(quantity, _)| *quantity == Quantity::Stroke));
+    assert!((observed.meter().extremes.of(Quantity::Stroke) - 1.001 - speed).abs() < 1e-12);
+    assert!(observed.meter().extremes.violations().iter().any(|(quantity, _)| *quantity == Quantity::Stroke));
 }
 
 #[test]
@@ -268,33 +271,62 @@ fn the_step_of_the_integration_is_short_enough() {
 /// Each way of being wrong is found within this many cycles under control \[1\].
 const ENOUGH_CYCLES: u64 = 600_000;
 
-#[test]
-fn a_controller_that_is_wrong_is_found() {
+/// What a search against a controller that is wrong on purpose finds, made simple.
+fn found(name: &str, doctor: Doctor) -> Genome {
     let reference = MACHINES.iter().position(|name| *name == "reference").unwrap();
-    let cases: [(Quantity, super::run::Doctor); 5] = [
-        (Quantity::Velocity, |_, parameters| parameters.limits.position.velocity *= 1.1),
-        (Quantity::AngularVelocity, |_, parameters| parameters.limits.orientation.velocity *= 1.1),
-        (Quantity::Acceleration, |_, parameters| {
+    let property = place(name);
+    let mut search = Search::doctored(reference, doctor, property);
+    search.climb(3, ENOUGH_CYCLES, Duration::ZERO, drop);
+    let largest = search.row.worst[property];
+    println!("{name}: {largest:.4} of {:.4} after {} runs", PROPERTIES[property].allowed(), search.row.runs);
+    let failed = search.worst().find(|found| found.property == property && found.is_violation());
+    let simple = failed.unwrap_or_else(|| panic!("{name}: {largest}")).simple(Some(doctor));
+    let text = simple.to_string();
+    println!("{text}");
+    // It is read back, and fails again; a controller without the fault does what is claimed.
+    let read = Genome::parse(&text).unwrap();
+    let allowed = PROPERTIES[property].allowed();
+    assert!(
+        run(&read, Some(doctor)).worst[property] > allowed && run(&read, None).worst[property] <= allowed,
+        "{text}"
+    );
+    simple
+}
+
+/// In the first tier the one that is found soonest.
+#[test]
+fn a_limit_that_is_five_percent_off_is_found_and_made_simple() {
+    let simple =
+        found("reference acceleration", |_, parameters| parameters.limits.position.acceleration *= 1.05);
+    assert!(simple.genes.len() < 25, "{simple}");
+}
+
+#[test]
+#[ignore = "second tier: takes long"]
+fn a_controller_that_is_wrong_is_found() {
+    let cases: [(&str, Doctor); 6] = [
+        ("stop time", |_, parameters| {
+            parameters.limits.position.acceleration *= 0.5;
+            parameters.limits.orientation.acceleration *= 0.5;
+        }),
+        ("velocity", |_, parameters| parameters.limits.position.velocity *= 1.1),
+        ("angular velocity", |_, parameters| parameters.limits.orientation.velocity *= 1.1),
+        ("acceleration", |_, parameters| {
             parameters.limits.position.acceleration *= 2.0;
             parameters.limits.position.jerk *= 2.0;
         }),
-        (Quantity::Stroke, |machine, _| {
+        ("stroke", |machine, _| {
             machine.actuator.min_length -= 0.01;
             machine.actuator.max_length += 0.01;
         }),
-        (Quantity::Envelope, |_, parameters| {
+        ("envelope", |_, parameters| {
             if let Some(envelope) = &mut parameters.envelope {
                 envelope.lowest = envelope.lowest.map(|low| low - 0.001);
                 envelope.highest = envelope.highest.map(|high| high + 0.001);
             }
         }),
     ];
-    for (quantity, doctor) in cases {
-        let mut search = Search::doctored(reference, doctor, quantity);
-        search.climb(3, ENOUGH_CYCLES, drop);
-        let largest = search.row.extremes.of(quantity);
-        let runs = search.row.runs;
-        println!("{}: {largest:.4} of {:.4} after {runs} runs", quantity.name(), quantity.allowed());
-        assert!(largest > quantity.allowed(), "{}: {largest}", quantity.name());
+    for (name, doctor) in cases {
+        found(name, doctor);
     }
 }

@@ -1,69 +1,76 @@
 //! The tests: genomes that are known, the search, and that a genome is a run.
 
 use std::collections::HashMap;
-use std::path::Path;
 use std::{env, fs};
 
 use hexad::control::parameters::ViolationPolicy;
 use hexad::model::random::Random;
+use hexad_support::certificate::Certificate;
+use hexad_support::extremes::Extremes;
+use hexad_support::search::climb::{Found, Search, fails, search};
+use hexad_support::search::genome::{Genome, Sensors, World};
+use hexad_support::search::machines::MACHINES;
+use hexad_support::search::property::{self, PROPERTIES, Property};
+use hexad_support::search::run::{run, run_with};
+use hexad_support::search::scenario::Scenario;
+use hexad_support::search::table;
+use hexad_support::{kept_files, repository};
 
-use super::common::certificate::Certificate;
-use super::common::extremes::Extremes;
-use super::genome::{Genome, Sensors};
-use super::machines::MACHINES;
-use super::run::{run, run_with};
-use super::scenario::Scenario;
-use super::search::{Found, Search, search};
-use super::{table, trace};
+use super::trace;
 
 /// Cycles under control of each machine with each policy, beside those of the genomes that are known.
 const CYCLES: u64 = 10_000;
 const LONG_CYCLES: u64 = 1_000_000;
-/// Genomes that are written of each policy and quantity.
+/// Genomes that are written of each policy and property.
 const KEPT: u32 = 3;
-/// Violations that are printed with what their genomes mean.
+/// Violations that are made simple, which takes seconds.
 const EXPLAINED: usize = 3;
 
 /// The genomes of `worst.txt`, which were the worst of their time.
 fn known() -> Vec<Genome> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/adversary/worst.txt");
+    let path = repository().join("tests/adversary/worst.txt");
     let text = fs::read_to_string(path).unwrap();
     let lines = text.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
     lines.map(|line| Genome::parse(line).unwrap_or_else(|| panic!("not a genome: {line}"))).collect()
 }
 
-/// Writes the worst genomes of each policy and quantity, over all machines.
+/// Writes the worst genomes of each policy and property, over all machines.
 fn keep(searches: &[Search], path: &str) {
     let mut all: Vec<_> = searches.iter().flat_map(Search::worst).collect();
     all.sort_by(|a, b| b.value.total_cmp(&a.value));
     let mut counts = HashMap::new();
     let mut lines: Vec<String> = Vec::new();
     for found in all {
-        let count = counts.entry((found.genome.policy as u32, found.quantity as u32)).or_insert(0);
+        let count = counts.entry((found.genome.policy as u32, found.property)).or_insert(0);
         *count += 1;
         let genome = found.genome.to_string();
         if *count <= KEPT && !lines.iter().any(|line| line.starts_with(&genome)) {
-            lines.push(format!("{genome} # {} {:.6}\n", found.quantity.name(), found.value));
+            lines.push(format!("{genome} # {} {:.6}\n", PROPERTIES[found.property].name, found.value));
         }
     }
-    let head = "# machine, policy, sensors, genes; quantity and value when it was found\n";
+    let head = "# machine, policy, sensors, world, genes; property and value when it was found\n";
     fs::write(path, head.to_owned() + &lines.concat()).unwrap();
 }
 
+/// Violations in words; the first are made simple and written to files.
 fn explain(violations: &[&Found]) -> String {
     let mut text = String::new();
-    for found in violations {
-        let (name, fault) = (found.quantity.name(), found.outcome.fault);
-        text += &format!("{name} {:.4}, fault {fault:?}: {}\n", found.value, found.genome);
-    }
-    for found in violations.iter().take(EXPLAINED) {
-        text += &format!(
-            "{} {:.4}: {:?} {:#?}\n",
-            found.quantity.name(),
-            found.value,
-            found.outcome.fault,
-            Scenario::of(&found.genome)
-        );
+    for (number, found) in violations.iter().enumerate() {
+        let (property, fault) = (&PROPERTIES[found.property], found.outcome.fault);
+        text += &format!("{}: {:.4} of {}, fault {fault:?}", property.name, found.value, property.allowed());
+        if number < EXPLAINED {
+            let file = kept_files().join(format!("violation-{number}.txt"));
+            let simple = found.simple(None);
+            let said = format!(
+                "# {}: {}\n{}\n",
+                property.name,
+                property.claim,
+                simple.to_string().replace(' ', "\n")
+            );
+            fs::write(&file, said).unwrap();
+            text += &format!("; HEXAD_ADVERSARY_TRACE={}: {simple}", file.display());
+        }
+        text += "\n";
     }
     text
 }
@@ -85,23 +92,36 @@ fn certificate_no_search_finds_a_motion_beyond_a_limit() {
         rows.iter().all(|row| row.cycles.iter().all(|cycles| *cycles > 0)),
         "a machine was never under control"
     );
+    // None of the worlds was left out.
+    let runs_of = |world: World, sensors: Sensors| {
+        rows.iter().map(|row| row.runs_of[world as usize][sensors as usize]).sum::<u64>()
+    };
+    for world in World::ALL {
+        assert!(
+            Sensors::ALL.into_iter().all(|sensors| runs_of(world, sensors) > 0),
+            "{world:?} without some sensors"
+        );
+    }
     certificate
         .finish(format_args!("{cycles} cycles of each machine and policy, {} violations", violations.len()));
     assert!(violations.is_empty(), "{} beyond a limit:\n{}", violations.len(), explain(&violations));
 }
 
-/// `HEXAD_ADVERSARY_TRACE="LINE OF A GENOME"` prints its run, and what each cycle added to an extreme.
+/// `HEXAD_ADVERSARY_TRACE=FILE` prints the run of the genome in a file, and what each cycle added to an extreme.
 #[test]
 #[ignore = "prints a run for a person"]
 fn trace() {
-    let line = env::var("HEXAD_ADVERSARY_TRACE").expect("HEXAD_ADVERSARY_TRACE: a line of worst.txt");
-    let genome = Genome::parse(&line).expect("a genome");
+    let file = env::var("HEXAD_ADVERSARY_TRACE").expect("HEXAD_ADVERSARY_TRACE: a file");
+    let genome = Genome::parse(&fs::read_to_string(file).expect("a file")).expect("a genome");
     println!("{:#?}", Scenario::of(&genome));
     let mut before = Extremes::default();
     let outcome = run_with(&genome, None, |observed, input, output| {
         trace::print(observed, input, output, &mut before);
     });
-    println!("{:?}", outcome.extremes.violations());
+    let failed = |(index, property): (usize, &Property)| {
+        fails(&genome, index, &outcome).then_some((property.name, outcome.worst[index]))
+    };
+    println!("{:?}", PROPERTIES.iter().enumerate().filter_map(failed).collect::<Vec<_>>());
 }
 
 #[test]
@@ -109,20 +129,37 @@ fn a_genome_is_written_and_read_back() {
     let mut random = Random::new(7);
     for machine in 0..MACHINES.len() {
         for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
-            let genome = Genome::random(machine, policy, Sensors::ALL[machine % 4], &mut random);
-            let line = format!("{genome} # velocity 1.0");
-            assert!(Genome::parse(&line).is_some_and(|read| read == genome), "{line}");
+            let world = World::ALL[machine % 2];
+            let genome = Genome::random(machine, policy, Sensors::ALL[machine % 4], world, &mut random);
+            for text in [format!("{genome} # velocity 1.0"), genome.to_string().replace(' ', "\n")] {
+                assert!(Genome::parse(&text).is_some_and(|read| read == genome), "{text}");
+            }
         }
     }
-    assert!(Genome::parse("nobody stop exact 00").is_none());
+    assert!(["nobody stop exact model", "tilted stop exact model a=b"].map(Genome::parse) == [None, None]);
 }
 
 #[test]
 fn a_genome_is_one_run() {
     let mut random = Random::new(11);
     for machine in 0..MACHINES.len() {
-        let genome = Genome::random(machine, ViolationPolicy::Stop, Sensors::ALL[machine % 4], &mut random);
+        let genome = Genome::random(
+            machine,
+            ViolationPolicy::Stop,
+            Sensors::ALL[machine % 4],
+            World::ALL[machine % 2],
+            &mut random,
+        );
         let (first, second) = (run(&genome, None), run(&genome, None));
-        assert_eq!((first.extremes, first.cycles), (second.extremes, second.cycles));
+        assert_eq!((first.worst, first.cycles), (second.worst, second.cycles));
     }
+}
+
+/// What has been searched, where a user looks for it.
+#[test]
+fn the_properties_are_in_the_guide_to_safety() {
+    let table = property::table();
+    println!("{table}");
+    let guide = fs::read_to_string(repository().join("docs/safety.md")).unwrap();
+    assert!(guide.contains(&table), "docs/safety.md must have:\n{table}");
 }

@@ -8,25 +8,24 @@ use hexad::model::inverse_geometry::universal_sine;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::plant::simulator::Brakes;
 
-use super::common::extremes::{Extremes, Quantity};
-use super::common::observed::Observed;
-use super::common::true_motion::reference;
+use hexad_support::extremes::{Extremes, Quantity};
+use hexad_support::rig::Rig;
 
 /// Largest values below this are not printed.
 const WORTH_PRINTING: f64 = 0.9;
 
 /// Prints a cycle in which the state changed or a quantity was never as large.
-pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut Extremes) {
-    let now = observed.meter.extremes;
+pub fn print(observed: &Rig, input: &Input, output: &Output, before: &mut Extremes) {
+    let now = observed.meter().extremes;
     let grown: Vec<_> = Quantity::ALL
         .into_iter()
         .filter(|quantity| now.of(*quantity) > before.of(*quantity).max(WORTH_PRINTING * quantity.allowed()))
         .map(|quantity| format!("{} {:.4}", quantity.name(), now.of(quantity)))
         .collect();
     *before = now;
-    let state = observed.simulator.state();
+    let state = observed.simulator().state();
     let (v, omega) = (state.twist.linear.norm(), state.twist.angular.norm());
-    let planned = reference(output).map(|motion| {
+    let planned = output.reference.map(|motion| {
         let [v, a] = [motion.twist.linear.norm(), motion.acceleration.linear.norm()];
         let [omega, alpha] = [motion.twist.angular.norm(), motion.acceleration.angular.norm()];
         format!("v {v:.4} a {a:.3} omega {omega:.4} alpha {alpha:.3}")
@@ -49,7 +48,7 @@ pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut E
          | setpoint age {:.2?} ms, measured {:.2?} ms | limits {:?} {:?} | {}",
         observed.time_s(),
         output.state.name(),
-        if observed.simulator.brakes() == Brakes::Open { "" } else { "brakes" },
+        if observed.simulator().brakes() == Brakes::Open { "" } else { "brakes" },
         planned.unwrap_or_default(),
         age_ms(input.setpoint.map(|setpoint| setpoint.time_ns)),
         age_ms(input.measurement.map(|measurement| measurement.time_ns)),

@@ -1,4 +1,4 @@
-//! A program with hexad's smallest feature set and nothing else: no standard library, no allocator, no C library.
+//! A program with hexad-core without its feature `std` and nothing else: no standard library, no allocator, no C library.
 //!
 //! It is linked, never run. Whatever hexad needs beyond `core` is a name that the linker does not find, or a crate
 //! that does not build for the target:
@@ -16,13 +16,13 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
-use hexad::control::controller::{Controller, Output};
-use hexad::control::parameters::Parameters;
-use hexad::control::signals::inputs::Input;
-use hexad::model::LEGS;
-use hexad::model::machine::Machine;
-use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
-use hexad::plant::simulator::Simulator;
+use hexad_core::control::controller::{Controller, Output};
+use hexad_core::control::parameters::Parameters;
+use hexad_core::control::signals::inputs::Input;
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::Machine;
+use hexad_core::motion::built_in::{BuiltInMotion, FittedMotion, fit};
+use hexad_core::plant::simulator::Simulator;
 
 /// Where the processor would begin. A function whose address is used is linked with all that it calls.
 #[unsafe(no_mangle)]

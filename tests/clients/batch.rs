@@ -8,10 +8,11 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::task::TaskState;
 
-use crate::common::libhexad::{repository, with_library};
-use crate::common::not_run::lacking;
-use crate::common::python::{environment, output};
 use crate::file;
+use hexad_support::libhexad::with_library;
+use hexad_support::not_run::lacking;
+use hexad_support::python::{environment, output};
+use hexad_support::repository;
 
 use super::frames::PACKAGES;
 

@@ -11,12 +11,13 @@ use std::time::Duration;
 
 use hexad::messages::{Bus, MeasuredMessage};
 
-use crate::common::libhexad::{built, prefix, repository, with_library};
-use crate::common::not_run::lacking;
-use crate::common::process::Process;
-use crate::common::python::output;
-use crate::common::stalls::Watchdog;
 use crate::{file, start_daemon};
+use hexad_support::libhexad::{built, prefix, with_library};
+use hexad_support::not_run::lacking;
+use hexad_support::process::Process;
+use hexad_support::python::output;
+use hexad_support::repository;
+use hexad_support::stalls::Watchdog;
 
 /// What a run does not survive, half of the drivers' watchdog, and how often it is tried.
 const HELD: Duration = Duration::from_millis(10);

@@ -2,9 +2,10 @@
 
 use std::process::Command;
 
-use crate::common::libhexad::{repository, with_library};
-use crate::common::not_run::lacking;
-use crate::common::python::{environment, output};
+use hexad_support::libhexad::with_library;
+use hexad_support::not_run::lacking;
+use hexad_support::python::{environment, output};
+use hexad_support::repository;
 
 /// The reference.
 pub const PACKAGES: [&str; 2] = ["numpy==2.3.5", "scipy==1.16.3"];

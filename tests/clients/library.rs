@@ -3,9 +3,9 @@
 use std::fs;
 use std::process::Command;
 
-use crate::common::libhexad::{cargo, prefix, with_library};
-use crate::common::python::output;
 use crate::file;
+use hexad_support::libhexad::{cargo, prefix, with_library};
+use hexad_support::python::output;
 
 /// Functions of the header.
 fn declared_functions() -> Vec<String> {

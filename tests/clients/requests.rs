@@ -3,10 +3,10 @@
 use std::fs;
 use std::process::{self, Command};
 
-use crate::common::libhexad::with_library;
-use crate::common::process::Process;
-use crate::common::python::output;
 use crate::start_daemon;
+use hexad_support::libhexad::with_library;
+use hexad_support::process::Process;
+use hexad_support::python::output;
 
 /// Sends a request, and prints what becomes of it.
 const PROGRAM: &str = "

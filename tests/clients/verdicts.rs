@@ -10,9 +10,9 @@ use hexad::messages::layout::{FieldType, Layout};
 use hexad::messages::{ForceMessage, MESSAGES, Message};
 use hexad::model::random::Random;
 
-use crate::common::libhexad::with_library;
-use crate::common::python::output;
 use crate::file;
+use hexad_support::libhexad::with_library;
+use hexad_support::python::output;
 
 /// Force messages, and messages of each other topic.
 const FORCES: usize = 10_000;

@@ -4,10 +4,11 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use crate::common::libhexad::{prefix, repository};
-use crate::common::not_run::lacking;
-use crate::common::python::{environment, output};
 use crate::file;
+use hexad_support::libhexad::prefix;
+use hexad_support::not_run::lacking;
+use hexad_support::python::{environment, output};
+use hexad_support::repository;
 
 /// What builds it.
 const BUILD_TOOLS: [&str; 1] = ["hatchling==1.27.0"];

@@ -14,9 +14,9 @@ use hexad::plant::imperfections::Imperfections;
 
 use rayon::prelude::*;
 
-use super::common::certificate::cases;
-use super::common::hardware_loop::{HardwareLoop, configured};
-use super::common::rig::parameters;
+use hexad_support::certificate::cases;
+use hexad_support::edited::configured;
+use hexad_support::rig::{Rig, parameters};
 
 /// After engaging, in which whatever grows has grown \[s\].
 const RUN_S: f64 = 8.0;
@@ -35,16 +35,16 @@ fn wobble_with(
 ) -> Result<f64, DiagnosticCode> {
     let mut platform = config.machine.clone();
     platform.platform.mass *= mass;
-    let mut control = HardwareLoop::new(config, &platform, &Imperfections::default());
+    let mut control = Rig::imperfect(config, &platform, &Imperfections::default());
     control.controller = Controller::new(&config.machine, *parameters);
     let home = TaskState::at_rest(config.machine.home);
     // The release is half a period after the measurement of now.
-    let periods = (age_ms * 1e6 / control.period_ns as f64 - 0.5).round() as usize;
+    let periods = (age_ms * 1e6 / control.parameters.period_ns as f64 - 0.5).round() as usize;
     let mut measured = VecDeque::new();
     let mut largest = 0.0_f64;
     let mut last = (State::Off, DiagnosticCode::None);
     while control.time_s() < RUN_S {
-        let mut input = control.input(&home);
+        let mut input = control.waiting_input(&home);
         measured.push_back(input.measurement);
         input.measurement = if measured.len() > periods { measured.pop_front().unwrap() } else { None };
         // Again and again, until it is carried out.

@@ -13,9 +13,9 @@ use hexad::model::task::TaskState;
 
 use rayon::prelude::*;
 
-use super::common::certificate::cases;
-use super::common::deployed;
-use super::common::rig::Rig;
+use hexad_support::certificate::cases;
+use hexad_support::deployed;
+use hexad_support::rig::Rig;
 
 const PERIOD_S: f64 = 1e-3;
 /// Time at rest before anything changes: control knows the payload after a second.
@@ -46,7 +46,7 @@ fn run(config: &Config, mass_ratio: f64, beside: impl Fn(f64) -> [f64; LEGS]) ->
         if cycle == before {
             let mut loaded = config.machine.clone();
             loaded.platform.mass *= mass_ratio;
-            rig.simulator = Rig::new(config, &loaded).simulator;
+            rig.put(Rig::new(config, &loaded).hardware);
         }
         let input = rig.input(&home);
         let output = rig.controller.step(&input);
@@ -54,7 +54,7 @@ fn run(config: &Config, mass_ratio: f64, beside: impl Fn(f64) -> [f64; LEGS]) ->
         if end.fault.is_none() && output.diagnostic.code != DiagnosticCode::None {
             end.fault = Some((output.diagnostic.code, since_s));
         }
-        let state = rig.simulator.state();
+        let state = rig.simulator().state();
         if !output.state.has_control() {
             end.final_speed = state.twist.linear.norm();
             break;

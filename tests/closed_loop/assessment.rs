@@ -12,8 +12,8 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector3;
 
-use super::common::rig::{Rig, in_motion, parameters};
-use super::common::{angle_between, deployed};
+use hexad_support::rig::{Rig, in_motion, parameters};
+use hexad_support::{angle_between, deployed};
 
 /// Following limits that nothing reaches.
 fn wide(parameters: Parameters) -> Parameters {
@@ -132,7 +132,7 @@ fn control_does_not_begin_without_a_verified_stop() {
             if k <= 3 {
                 output = Some(rig.controller.step(&input));
             }
-            rig.now_ns += rig.period_ns;
+            rig.now_ns += rig.parameters.period_ns;
         }
         let output = output.unwrap();
         let (state, code) = match is_refused {
@@ -156,7 +156,7 @@ fn states_end_where_their_motion_does() {
         (output, cycles) = (rig.cycle(&rig.input(&task)), cycles + 1);
     }
     assert_eq!(output.state, State::Standby);
-    let speed = rig.simulator.state().twist.linear.norm();
+    let speed = rig.simulator().state().twist.linear.norm();
     assert!(cycles > 50 && speed < 1e-4, "{cycles} cycles, {speed} m/s");
     // Distance of the reference from a task over the engage tolerance, when a state ends.
     let distance = |motion: &Motion, task: &TaskState| {
@@ -200,7 +200,7 @@ fn an_old_setpoint_does_not_begin_control() {
                 (task.xd[3], task.xdd[3]) = (velocity, acceleration);
                 let mut setpoint = rig.input(&task).setpoint.unwrap();
                 setpoint.kind = kind;
-                for _ in 0..parameters.setpoint_timeout_ns / rig.period_ns + 2 {
+                for _ in 0..parameters.setpoint_timeout_ns / rig.parameters.period_ns + 2 {
                     let mut input = rig.input(&task);
                     input.setpoint = Some(setpoint);
                     _ = rig.cycle(&input);

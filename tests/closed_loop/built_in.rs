@@ -12,9 +12,9 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use rayon::prelude::*;
 
-use super::common::certificate::cases;
-use super::common::deployed;
-use super::common::rig::Rig;
+use hexad_support::certificate::cases;
+use hexad_support::deployed;
+use hexad_support::rig::Rig;
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [BuiltInMotion; 5] = [
@@ -54,7 +54,7 @@ fn engage(rig: &mut Rig, task: &TaskState) {
 fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
     let mut rig = Rig::new(config, &config.machine);
     engage(&mut rig, &scene.at(0.0));
-    let period_s = rig.period_ns as f64 * 1e-9;
+    let period_s = rig.parameters.period_ns as f64 * 1e-9;
     let cycles = (scene.duration / period_s) as u32 + 10;
     (0..cycles).all(|k| {
         let output = rig.cycle(&rig.input(&scene.at((f64::from(k) - phase) * period_s)));

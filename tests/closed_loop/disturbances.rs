@@ -7,8 +7,8 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
 use hexad::model::task::TaskState;
 
-use super::common::deployed;
-use super::common::rig::{Rig, parameters};
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters};
 
 fn compensating(is_compensating: bool) -> Config {
     let mut config = deployed("motion_base");
@@ -25,7 +25,7 @@ fn sag(config: &Config, seconds: u32) -> f64 {
     let home = TaskState::at_rest(config.machine.home);
     rig.engage(&home);
     (0..1000 * seconds).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
-    (rig.simulator.state().pose.position - home.motion().pose.position).norm()
+    (rig.simulator().state().pose.position - home.motion().pose.position).norm()
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn overshoot(config: &Config) -> f64 {
             output.force[leg] - if loaded { weight[0][leg] - weight[1][leg] } else { 0.0 }
         })));
         if !loaded {
-            highest = highest.max(rig.simulator.state().pose.position.z - config.machine.home[5]);
+            highest = highest.max(rig.simulator().state().pose.position.z - config.machine.home[5]);
         }
     }
     assert!(limited > 150, "{limited} cycles at the limit");
@@ -100,7 +100,7 @@ fn it_begins_anew_with_each_engagement() {
     let first = |rig: &mut Rig| {
         rig.ask(Request::Engage);
         let setpoint = TaskState::at_rest(hexad::model::task::task_coordinates(
-            &rig.simulator.state().pose,
+            &rig.simulator().state().pose,
             &config.machine.home,
         ));
         rig.controller.clone().step(&rig.input(&setpoint)).force

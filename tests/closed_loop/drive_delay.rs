@@ -8,8 +8,9 @@ use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfecti
 
 use rayon::prelude::*;
 
-use super::common::certificate::cases;
-use super::common::hardware_loop::{HardwareLoop, SENDING, configured, record};
+use hexad_support::certificate::cases;
+use hexad_support::edited::configured;
+use hexad_support::rig::{Rig, SENDING, record};
 
 /// Duration of the motion \[s\].
 const MOTION_S: f64 = 20.0;
@@ -32,11 +33,11 @@ fn measured(config: &Config, imperfections: &Imperfections) -> Option<DriveDelay
 }
 
 fn recorded(config: &Config, imperfections: &Imperfections, motion: BuiltInMotion) -> RecordedStretch {
-    let mut control = HardwareLoop::new(config, &config.machine, imperfections);
+    let mut control = Rig::imperfect(config, &config.machine, imperfections);
     let motion = fit(&config.machine, motion, MOTION_S);
     let mut stretch = RecordedStretch::default();
     while control.time_s() < SETTLING_S + MOTION_S {
-        let input = control.input(&motion.at(control.time_s() - SETTLING_S));
+        let input = control.waiting_input(&motion.at(control.time_s() - SETTLING_S));
         let output = control.cycle(&input);
         if control.time_s() > SETTLING_S {
             assert_eq!(output.state, State::Active, "{:?}", output.diagnostic);
@@ -49,6 +50,7 @@ fn recorded(config: &Config, imperfections: &Imperfections, motion: BuiltInMotio
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn certificate_the_delay_of_the_drives_is_measured() {
     // Friction as a share of the largest force, which on the light machine is many times its weight.
     let loops = [("motion_base", 1000.0, 0.01), ("fried2008", 1000.0, 0.001), ("motion_base", 250.0, 0.003)];

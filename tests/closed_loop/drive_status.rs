@@ -1,5 +1,6 @@
 //! What a driver reports of its drives: control waits for them, and ends if they fault or if a force does not arrive.
 
+use hexad::config::Config;
 use hexad::control::controller::Output;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::DriveStatus;
@@ -9,8 +10,10 @@ use hexad::model::LEGS;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::deployed;
-use super::common::rig::{Rig, in_motion};
+use hexad::model::random::Random;
+use hexad_support::deployed;
+use hexad_support::edited::configured;
+use hexad_support::rig::{Rig, in_motion};
 
 const ALL: u32 = (1 << LEGS) - 1;
 
@@ -40,7 +43,7 @@ fn engaged(opens_after: usize) -> (Vec<Output>, f64) {
         };
         let output = rig.controller.step(&reporting(&rig.input(&home), drives));
         rig.pass((is_open && output.state.has_control()).then_some(output.force));
-        let way = rig.simulator.state().pose.position - home.motion().pose.position;
+        let way = rig.simulator().state().pose.position - home.motion().pose.position;
         farthest = farthest.max(way.norm());
         outputs.push(output);
         if output.state == State::Active || !output.state.has_control() {
@@ -96,38 +99,44 @@ fn a_brake_that_closes_or_a_drive_that_faults_ends_control() {
     }
 }
 
-/// In motion, with actual forces of `scale` of the commanded ones, so many cycles late, of which one leg has `share`; what acts
-/// is what is reported. The cycles until control ends, cause, leg, and the largest way from the setpoint \[m\].
+/// In motion, with actual forces reported as `scale` of the commanded ones, so many cycles late, of which one leg reports the first
+/// share and has the second. While the link is down no message passes, and the drives hold their forces. The cycles until control
+/// ends, cause, leg, and the largest way from the setpoint \[m\].
 fn with_forces(
-    scale: f64,
-    late: usize,
-    share: f64,
+    config: &Config,
+    (scale, late, [reported, acting]): (f64, usize, [f64; 2]),
     cycles: usize,
+    is_down: impl Fn(usize) -> bool,
 ) -> Option<(usize, DiagnosticCode, u32, f64)> {
-    let config = deployed("motion_base");
-    let (mut rig, _) = in_motion(&config);
+    let (mut rig, _) = in_motion(config);
     let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
-    let period_s = rig.period_ns as f64 * 1e-9;
-    let mut sent = vec![];
+    let period_s = rig.parameters.period_ns as f64 * 1e-9;
+    let mut arrived = vec![];
     let mut farthest = 0.0_f64;
     for k in 0..cycles {
         let task = scene.at(period_s * (1500 + k) as f64);
         let mut input = rig.input(&task);
-        if sent.len() > late {
-            let mut force: [f64; LEGS] = sent[sent.len() - 1 - late];
+        if arrived.len() > late {
+            let mut force: [f64; LEGS] = arrived[arrived.len() - 1 - late];
             force = force.map(|force| scale * force);
-            force[1] *= share;
+            force[1] *= reported;
             let drives = DriveStatus { force: Some(force), ..DriveStatus::default() };
             input = reporting(&input, drives);
+        }
+        if is_down(k) {
+            input.measurement = None;
+            // The source gets a processor before the driver.
+            input.setpoint = input.setpoint.filter(|_| !is_down(k + 12));
         }
         let output = rig.controller.step(&input);
         if !output.state.has_control() {
             return Some((k, output.diagnostic.code, output.diagnostic.index, farthest));
         }
-        sent.push(output.force);
-        let mut acts = output.force;
-        acts[1] *= share;
-        let way = rig.simulator.state().pose.position - task.motion().pose.position;
+        let held = arrived.last().copied().filter(|_| is_down(k));
+        let mut acts = held.unwrap_or(output.force);
+        arrived.push(acts);
+        acts[1] *= acting;
+        let way = rig.simulator().state().pose.position - task.motion().pose.position;
         farthest = farthest.max(way.norm());
         rig.pass(Some(acts));
     }
@@ -136,7 +145,9 @@ fn with_forces(
 
 #[test]
 fn a_force_that_does_not_arrive_is_noticed_by_the_drive_that_lacks_it() {
-    let (cycles, code, leg, farthest) = with_forces(1.0, 1, 0.5, 2000).expect("control ends");
+    let half = (1.0, 1, [0.5; 2]);
+    let (cycles, code, leg, farthest) =
+        with_forces(&deployed("motion_base"), half, 2000, |_| false).expect("control ends");
     println!("half of a force: {cycles} cycles, {farthest:.2e} m");
     assert_eq!((code, leg), (DiagnosticCode::DriveForceMissing, 2));
     assert!(cycles < 150 && farthest < 2e-3, "{cycles} cycles, {farthest} m");
@@ -145,6 +156,31 @@ fn a_force_that_does_not_arrive_is_noticed_by_the_drive_that_lacks_it() {
 #[test]
 fn forces_of_a_tenth_less_that_are_late_are_no_fault() {
     for (scale, late) in [(1.0, 0), (0.9, 5), (1.1, 10)] {
-        assert_eq!(with_forces(scale, late, 1.0, 4000), None, "{scale}, {late} ms late");
+        let end = with_forces(&deployed("motion_base"), (scale, late, [1.0; 2]), 4000, |_| false);
+        assert_eq!(end, None, "{scale}, {late} ms late");
+    }
+}
+
+/// A pause of the link that the timeouts permit ends nothing, whenever and however often it comes; a drive that then
+/// reports half of its force is still found.
+#[test]
+fn a_link_that_was_down_is_no_fault_of_a_drive() {
+    let timeouts = "[timeouts]\nsetpoint_ms = 100.0\nmeasured_ms = 100.0\nallow_unstable_age = true\n[drive]\ndelay_us = 100";
+    let config = configured("motion_base", timeouts);
+    for number in 0..12 {
+        let mut random = Random::new(number);
+        let pauses: [_; 8] = std::array::from_fn(|k| {
+            let start = 250 * k + 50 + (100.0 * random.uniform()) as usize;
+            start..start + (80.0 * random.uniform()) as usize
+        });
+        let is_down = |k: usize| pauses.iter().any(|pause| pause.contains(&k));
+        let end = with_forces(&config, (1.0, 2, [1.0; 2]), 2000, is_down);
+        assert_eq!(end, None, "{number}: {pauses:?}");
+        // By the report alone: the motion shows nothing.
+        let end = with_forces(&config, (1.0, 2, [0.5, 1.0]), 2000, is_down);
+        assert!(
+            end.is_some_and(|(_, code, leg, _)| (code, leg) == (DiagnosticCode::DriveForceMissing, 2)),
+            "{end:?}"
+        );
     }
 }

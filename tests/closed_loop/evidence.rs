@@ -9,8 +9,8 @@ use hexad::control::signals::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 
-use super::common::deployed;
-use super::common::rig::{Rig, parameters};
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters};
 
 /// Active, at rest at home.
 fn at_rest() -> (Rig, TaskState) {

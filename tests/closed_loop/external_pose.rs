@@ -7,8 +7,8 @@ use hexad::control::signals::state::{Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::deployed;
-use super::common::rig::Rig;
+use hexad_support::deployed;
+use hexad_support::rig::Rig;
 
 /// What the readings of a leg are in place of its length.
 type Reading = fn(leg: usize, length: f64, home: f64) -> f64;
@@ -20,7 +20,7 @@ fn play(read: Reading, noise_m: f64, is_measured: bool) -> (Option<Output>, f64)
     let machine = &config.machine;
     let mut rig = Rig::new(&config, machine);
     let scene = fit(machine, BuiltInMotion::Sines, 8.0);
-    let home_length = rig.simulator.leg_motion().length;
+    let home_length = rig.simulator().leg_motion().length;
     let mut farthest = 0.0_f64;
     for k in 0..7000_u32 {
         let task = if k < 1000 {
@@ -29,7 +29,7 @@ fn play(read: Reading, noise_m: f64, is_measured: bool) -> (Option<Output>, f64)
             scene.at(1e-3 * f64::from(k - 1000))
         };
         let mut input: Input = rig.input(&task);
-        let state = *rig.simulator.state();
+        let state = *rig.simulator().state();
         let measurement = input.measurement.as_mut().unwrap();
         for (leg, length) in measurement.length.iter_mut().enumerate() {
             *length = read(leg, *length, home_length[leg]);

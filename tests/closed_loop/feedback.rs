@@ -6,17 +6,16 @@ use hexad::control::law::ControlMode;
 use hexad::control::parameters::Parameters;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::State;
-use hexad::model::machine::Machine;
 use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Twist};
 use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::simulator::Simulator;
 use nalgebra::{Vector3, Vector6};
 
-use super::common::limit_check::TrueMotion;
-use super::common::rig::{Rig, answer, parameters};
-use super::common::{deployed, largest};
+use super::answer::answer;
+use hexad_support::limit_check::TrueMotion;
+use hexad_support::rig::{Rig, parameters};
+use hexad_support::{deployed, largest};
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 
@@ -45,11 +44,6 @@ fn at_home(config: &Config) -> (Rig, TaskState, Parameters) {
     (rig, home, parameters(config))
 }
 
-fn at_rest(config: &Config, platform: &Machine) -> Simulator {
-    let plant = &config.deployment.plant;
-    Simulator::new(platform, plant.brake_deceleration_m_s2, plant.step_s)
-}
-
 /// Position and orientation each: no more than `(1 + feedback_scale)` times the limit in the direction of the error, and
 /// all of it where it is less.
 #[test]
@@ -72,10 +66,10 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
             let x = home.x + Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             aside.home = x.into();
             let mut rig = rig.clone();
-            rig.simulator = at_rest(&config, &aside);
+            rig.put(Rig::new(&config, &aside).hardware);
             let output = rig.controller.step(&rig.input(&home));
             assert_eq!(output.state, State::Active, "{name}: {:?}", output.diagnostic);
-            let pose = rig.simulator.state().pose;
+            let pose = rig.simulator().state().pose;
             let found = dynamics.acceleration(&pose, &Twist::default(), &output.force).unwrap();
             let error = pose.displacement_to(&home.motion().pose).vector();
             let wanted = Acceleration::from_vector(&answer(&config, &error));
@@ -127,7 +121,7 @@ fn reference_and_feedback_together_end_at_the_bound() {
         task.xd[5] = size * w * (w * t).cos();
         task.xdd[5] = -size * w * w * (w * t).sin();
         let input = rig.input(&task);
-        let pose = rig.simulator.state();
+        let pose = rig.simulator().state();
         let measured = (pose.pose, pose.twist);
         let output = rig.cycle(&input);
         assert_eq!(output.state, State::Active, "{cycle}: {:?}", output.diagnostic);
@@ -160,7 +154,7 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
             assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active, "{name} {}", mode.name())
         });
         let law = &parameters.law;
-        let legs = super::common::Legs::of(&config.machine);
+        let legs = hexad_support::Legs::of(&config.machine);
         let arm = legs.platform.iter().map(Vector3::norm).fold(0.0, f64::max);
         let limit =
             parameters.limits.position.acceleration + arm * parameters.limits.orientation.acceleration;
@@ -233,7 +227,7 @@ fn held(free_after: u32) -> (u32, Output, TrueMotion, Parameters) {
         if !matches!(output.state, State::Active) {
             return (saturated, output, felt, parameters);
         }
-        let pose = rig.simulator.state().pose;
+        let pose = rig.simulator().state().pose;
         let found = dynamics.acceleration(&pose, &Twist::default(), &output.force).unwrap().linear.norm();
         // The reference has no acceleration any more.
         saturated += u32::from((found / bound - 1.0).abs() < 0.01 && t > ramp);

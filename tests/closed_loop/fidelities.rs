@@ -9,8 +9,8 @@ use hexad::control::signals::state::State;
 use hexad::model::fidelity::Fidelity;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::deployed;
-use super::common::rig::{Rig, parameters, track};
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters, track};
 
 #[test]
 fn the_loop_tracks_on_every_rung_with_inertia_and_better_on_higher_ones() {

@@ -11,8 +11,8 @@ use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::rig::{Rig, in_motion, parameters};
-use super::common::{deployed, largest};
+use hexad_support::rig::{Rig, in_motion, parameters};
+use hexad_support::{deployed, largest};
 
 /// Asserts a state without force, and why.
 pub fn assert_without_force(output: &Output, state: State, cause: DiagnosticCode) {
@@ -214,9 +214,11 @@ fn a_message_counts_until_it_is_as_old_as_its_timeout() {
         let begin_ns = rig.now_ns;
         input.release_ns = begin_ns + age_ns;
         if of_setpoint {
-            rig.simulator.advance(age_ns as f64 * 1e-9, Some(&force));
+            rig.hardware.advance(age_ns, Some(force));
+            rig.put(rig.hardware.clone());
         }
-        let young = Rig { now_ns: input.release_ns, ..rig.clone() }.input(&task.after(age_ns as f64 * 1e-9));
+        rig.now_ns = input.release_ns;
+        let young = rig.input(&task.after(age_ns as f64 * 1e-9));
         if of_setpoint {
             input.measurement = young.measurement;
         } else {
@@ -277,7 +279,7 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
             output.diagnostic
         );
     }
-    let kinematic_state = KinematicState::new(&config.machine, rig.simulator.state().pose);
+    let kinematic_state = KinematicState::new(&config.machine, rig.simulator().state().pose);
     let trusted = kinematic_state.sensitivity().trusted_step * config.machine.joints.radius;
     assert!(furthest > 1.5 * trusted, "{furthest} m of {trusted} m");
 }
@@ -294,7 +296,7 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
         let (mut rig, _) = in_motion(&config);
         let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
         let last = rig.input(&scene.at(1.5)).setpoint;
-        let (mut twist, mut before) = (rig.simulator.state().twist.linear, None);
+        let (mut twist, mut before) = (rig.simulator().state().twist.linear, None);
         let (mut strongest, mut jolt) = (0.0_f64, 0.0_f64);
         let mut end = (State::Off, DiagnosticCode::None);
         for k in 0..400 {
@@ -309,7 +311,7 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
             if !output.state.has_control() {
                 break;
             }
-            let now = rig.simulator.state().twist.linear;
+            let now = rig.simulator().state().twist.linear;
             let acceleration = (now - twist) / 1e-3;
             twist = now;
             strongest = strongest.max(acceleration.norm());

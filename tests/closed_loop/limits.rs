@@ -6,8 +6,8 @@ use hexad::model::LEGS;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::rig::{Rig, in_motion};
-use super::common::{deployed, largest};
+use hexad_support::rig::{Rig, in_motion};
+use hexad_support::{deployed, largest};
 
 /// With bounds beyond all that a setpoint or feedback asks for here.
 fn unbounded(name: &str) -> Config {
@@ -35,7 +35,7 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
         platform.platform.center_of_mass.x += config.machine.joints.radius;
         let mut rig = Rig::new(&config, &platform);
         let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
-        rig.play(&config.machine, &scene, |_, output| {
+        rig.play(&scene, |_, output| {
             assert!(largest(&output.force) <= limit, "{name}: {:?}", output.force);
             limited += u32::from(largest(&output.force) > limit * (1.0 - 1e-9));
             assert!(output.state.has_control() || output.force == [0.0; LEGS]);

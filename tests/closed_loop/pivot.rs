@@ -16,8 +16,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use toml::{Table, Value};
 
-use super::common::hardware_loop::HardwareLoop;
-use super::common::rig::parameters;
+use hexad_support::rig::{Rig, parameters};
 
 /// From the platform's origin to the vertex \[m\].
 const ARM_M: f64 = 0.35;
@@ -77,7 +76,7 @@ struct Turn {
 fn turn(config: &Config, motion: &ToolMotion, vertex: impl Fn(&Pose) -> Vector3<f64>, seed: u64) -> Turn {
     let sensor = SensorErrors { length_noise: 1e-7, ..SensorErrors::default() };
     let imperfections = Imperfections { seed, sensor, ..Imperfections::default() };
-    let mut control = HardwareLoop::new(config, &config.machine, &imperfections);
+    let mut control = Rig::imperfect(config, &config.machine, &imperfections);
     let begin_s = SETTLING_S + MEAN_S;
     let end_s = begin_s + motion.duration_s;
     let [mut before, mut during, mut after] = [const { Places(vec![]) }; 3];
@@ -85,7 +84,7 @@ fn turn(config: &Config, motion: &ToolMotion, vertex: impl Fn(&Pose) -> Vector3<
     while control.time_s() < end_s + SETTLING_S + MEAN_S {
         let now_s = control.time_s();
         let task = motion.task_state(now_s - begin_s, &config.machine.home).unwrap();
-        let mut input = control.input(&task);
+        let mut input = control.waiting_input(&task);
         if now_s > end_s {
             let rest = Setpoint::motion(control.now_ns, TaskState::at_rest(task.x.into()));
             input.setpoint = Some(Setpoint { kind: SetpointKind::Target, ..rest });
@@ -164,6 +163,7 @@ fn a_target_alone_moves_the_vertex() {
     let off = |pose: &Pose| (frames.tool_pose(pose).position - frames.tool_pose(&home).position).norm();
     target_motion(&constants, &home, &turned, 1.0, |reference, _| {
         farthest = farthest.max(off(&reference.motion().pose));
+        true
     })
     .unwrap();
     println!("{:.1} um", 1e6 * farthest);

@@ -82,6 +82,7 @@ fn white_noise_is_no_fault() {
 
 /// Poses that no leg reaches, in each direction: the platform goes to the end of the stroke, no further, and comes back.
 #[test]
+#[ignore = "second tier: takes long"]
 fn poses_beyond_the_stroke_are_approached_to_its_end() {
     for name in MACHINES {
         let config = with_policy(name, ViolationPolicy::Limit);
@@ -132,7 +133,7 @@ fn a_source_that_dies_and_comes_back_elsewhere_is_no_fault() {
             assert_eq!(state, State::Active, "{name}");
         };
         plays(&mut ride, 0.0, Vector6::zeros());
-        assert!(ride.rig.simulator.state().twist.vector().norm() > 0.05);
+        assert!(ride.rig.simulator().state().twist.vector().norm() > 0.05);
         // Carried on for the timeout, then at rest within the limits, then still.
         let timeout = (config.deployment.timeouts.setpoint_s * 1e3) as u32;
         let mut held = None;
@@ -145,10 +146,10 @@ fn a_source_that_dies_and_comes_back_elsewhere_is_no_fault() {
             );
             if cycle == 1000 {
                 held = output.platform.map(|platform| platform.pose);
-                assert!(ride.rig.simulator.state().twist.vector().norm() < 1e-4, "{name}: it moves");
+                assert!(ride.rig.simulator().state().twist.vector().norm() < 1e-4, "{name}: it moves");
             }
         }
-        let drift = (held.unwrap().position - ride.rig.simulator.state().pose.position).norm();
+        let drift = (held.unwrap().position - ride.rig.simulator().state().pose.position).norm();
         assert!(drift < 1e-6, "{name}: {drift} m away from the held pose");
         // The next source is 5 cm beside the scene, in its middle.
         plays(&mut ride, 2.0, Vector6::new(0.0, 0.0, 0.0, 0.03, -0.04, 0.0));

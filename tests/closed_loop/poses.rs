@@ -9,9 +9,9 @@ use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::rigid::Pose;
 use hexad::model::task::TaskState;
 
-use super::common::deployed;
-use super::common::rig::{Rig, parameters};
 use super::inputs::assert_without_force;
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters};
 
 #[test]
 fn a_pose_far_from_home_is_found_in_bounded_steps() {

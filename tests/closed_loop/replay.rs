@@ -4,8 +4,8 @@ use hexad::control::controller::{Controller, Output};
 use hexad::control::signals::inputs::Input;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::deployed;
-use super::common::rig::{Rig, parameters};
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters};
 
 /// All bits of an output: `Debug` of a float reads back the same, signed zeros included.
 fn bits(output: &Output) -> String {
@@ -19,7 +19,7 @@ fn recorded_inputs_give_the_same_outputs_bit_for_bit() {
         let mut rig = Rig::new(&config, &config.machine);
         let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
         let mut record: Vec<(Input, Output)> = Vec::new();
-        rig.play(&config.machine, &scene, |input, output| record.push((*input, *output)));
+        rig.play(&scene, |input, output| record.push((*input, *output)));
         assert!(record.len() > 5000);
 
         let mut fresh = Controller::new(&config.machine, parameters(&config));
@@ -37,7 +37,7 @@ fn recorded_inputs_give_the_same_outputs_bit_for_bit() {
 #[test]
 fn a_controller_is_its_state() {
     let config = deployed("fried2008");
-    let (mut rig, task) = super::common::rig::in_motion(&config);
+    let (mut rig, task) = hexad_support::rig::in_motion(&config);
     let mut copy = rig.controller.clone();
     for _ in 0..100 {
         let input = rig.input(&task.after(0.0));
@@ -54,7 +54,7 @@ fn the_clock_may_start_anywhere() {
         let mut rig = Rig::new(&config, &config.machine);
         rig.now_ns = start_ns;
         let mut outputs = Vec::new();
-        rig.play(&config.machine, &scene, |_, output| outputs.push(bits(output)));
+        rig.play(&scene, |_, output| outputs.push(bits(output)));
         outputs
     });
     let [early, late] = &mut outputs;

@@ -10,9 +10,9 @@ use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 
-use super::common::limit_check::{Largest, TrueMotion};
-use super::common::rig::{Rig, parameters};
-use super::common::{angle_between, deployed};
+use hexad_support::limit_check::{Largest, TrueMotion};
+use hexad_support::rig::{Rig, parameters};
+use hexad_support::{angle_between, deployed};
 
 pub const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 
@@ -80,13 +80,13 @@ impl Ride {
     }
 
     pub fn distance(&self, task: &TaskState) -> [f64; 2] {
-        let (pose, wanted) = (self.rig.simulator.state().pose, task.motion().pose);
+        let (pose, wanted) = (self.rig.simulator().state().pose, task.motion().pose);
         [(pose.position - wanted.position).norm(), angle_between(&pose.rotation, &wanted.rotation)]
     }
 
     /// Difference of the velocities \[m/s\] and of the angular velocities \[rad/s\].
     pub fn velocity_error(&self, task: &TaskState) -> [f64; 2] {
-        let (twist, wanted) = (self.rig.simulator.state().twist, task.motion().twist);
+        let (twist, wanted) = (self.rig.simulator().state().twist, task.motion().twist);
         [(twist.linear - wanted.linear).norm(), (twist.angular - wanted.angular).norm()]
     }
 
@@ -96,7 +96,7 @@ impl Ride {
         println!("{what}: {:.4?}", self.felt.largest);
         let is_flat = condition
             > 2.0
-                * KinematicState::new(self.rig.simulator.machine(), self.home.motion().pose)
+                * KinematicState::new(self.rig.simulator().machine(), self.home.motion().pose)
                     .sensitivity()
                     .condition;
         let most = if is_flat { TRUE_ACCELERATION_NEARLY_FLAT } else { TRUE_ACCELERATION };

@@ -10,8 +10,8 @@ use hexad::control::signals::state::{Request, State};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
 
-use super::common::deployed;
-use super::common::rig::{Rig, parameters};
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters};
 
 #[test]
 fn a_setpoint_is_checked_against_each_limit() {

@@ -5,8 +5,8 @@ use hexad::control::signals::inputs::Input;
 use hexad::control::signals::state::Request;
 use hexad::model::task::TaskState;
 
-use super::common::deployed;
-use super::common::rig::Rig;
+use hexad_support::deployed;
+use hexad_support::rig::Rig;
 
 /// Cycles under control until it ends, with stamps that advance by `rate` of the daemon's clock, and the cause. Every message
 /// arrives up to `jitter_ns` late.
@@ -39,7 +39,7 @@ fn end(rate: f64, jitter_ns: u64, cycles: u64) -> Option<(u64, DiagnosticCode)> 
         if cycle > 300 + cycles {
             return None;
         }
-        stamp_ns += rig.period_ns as f64 * if has_begun { rate } else { 1.0 };
+        stamp_ns += rig.parameters.period_ns as f64 * if has_begun { rate } else { 1.0 };
     }
     None
 }
@@ -57,6 +57,7 @@ fn stamps_that_stand_still_or_run_slow_or_fast_end_control() {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn clocks_that_drift_and_messages_that_arrive_late_do_not() {
     for rate in [0.995, 0.9999, 1.0, 1.0001, 1.005] {
         for jitter_ns in [0, 15_000_000] {

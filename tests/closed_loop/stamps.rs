@@ -7,8 +7,8 @@ use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::deployed;
-use super::common::rig::{Rig, in_motion};
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, in_motion};
 
 /// An input whose measurement is stamped so much later \[ns\].
 fn ahead(input: &Input, lead_ns: u64) -> Input {
@@ -45,7 +45,7 @@ fn stamps_of_the_future_end_control_while_the_platform_is_on_its_reference() {
     let config = deployed("motion_base");
     let (mut rig, _) = in_motion(&config);
     let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
-    let period_s = rig.period_ns as f64 * 1e-9;
+    let period_s = rig.parameters.period_ns as f64 * 1e-9;
     let mut farthest = 0.0_f64;
     let end = (1500..2500).find_map(|k| {
         let input = ahead(&rig.input(&scene.at(period_s * f64::from(k))), 19_000_000);
@@ -53,7 +53,7 @@ fn stamps_of_the_future_end_control_while_the_platform_is_on_its_reference() {
         let reference = output.reference.filter(|_| output.state.has_control());
         let Some(reference) = reference else { return Some((k - 1500, output.diagnostic.code)) };
         // The reference is that of the end of the hold, at which the platform now is.
-        let error = reference.pose.position - rig.simulator.state().pose.position;
+        let error = reference.pose.position - rig.simulator().state().pose.position;
         farthest = farthest.max(error.norm());
         None
     });

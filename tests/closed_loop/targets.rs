@@ -8,9 +8,9 @@ use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{rise, straight_move};
 use nalgebra::Vector6;
 
-use super::common::limit_check::{Largest, TrueMotion};
-use super::common::rig::{Rig, parameters};
 use super::ride::{MACHINES, Ride, TRUE_ACCELERATION, TRUE_JERK, beside, with_policy};
+use hexad_support::limit_check::{Largest, TrueMotion};
+use hexad_support::rig::{Rig, parameters};
 
 /// One message with a pose to go to: the platform goes there with `autonomous_scale` of the limits and stands, for as long
 /// as nobody sends anything else.
@@ -100,7 +100,7 @@ fn a_slow_platform_carries_an_unknown_payload_as_a_fast_one_does() {
             let output = rig.cycle(&rig.input(&home));
             assert_eq!(output.diagnostic.code, DiagnosticCode::None, "scale {scale}, {cycle}");
         }
-        let distance = (rig.simulator.state().pose.position - home.motion().pose.position).norm();
+        let distance = (rig.simulator().state().pose.position - home.motion().pose.position).norm();
         assert!(distance < 1e-6, "scale {scale}: {distance}");
     }
 }
@@ -128,7 +128,7 @@ fn control_begins_on_a_target_far_away() {
         }
         states.dedup();
         assert_eq!(states, [State::Engaging, State::Active], "{policy:?}");
-        assert!((rig.simulator.state().pose.position - there.motion().pose.position).norm() < 1e-8);
+        assert!((rig.simulator().state().pose.position - there.motion().pose.position).norm() < 1e-8);
         let Largest { velocity, acceleration, .. } = felt.largest;
         let bound = TRUE_ACCELERATION * parameters.limits.autonomous_scale;
         println!("{policy:?}: {:?}", felt.largest);

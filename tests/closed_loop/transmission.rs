@@ -6,8 +6,8 @@ use hexad::model::fidelity::Gravity;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::BuiltInMotion;
 
-use super::common::deployed;
-use super::common::rig::{Tracking, track};
+use hexad_support::deployed;
+use hexad_support::rig::{Tracking, track};
 
 /// From an eighth too weak to an eighth too strong; screws that lose up to 4 % of their force.
 const FORCE_SCALE: [f64; 6] = [0.88, 1.12, 0.95, 1.04, 1.0, 0.91];

@@ -16,9 +16,9 @@ use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
-use super::common::certificate::Certificate;
-use super::common::rig::{Rig, parameters};
 use super::ride::{MACHINES, with_policy};
+use hexad_support::certificate::Certificate;
+use hexad_support::rig::{Rig, parameters};
 
 /// Forces of the drives at home as shares of the largest force.
 const HOLDING_AT_HOME: [f64; 3] = [0.6, 0.3, 0.1];
@@ -82,6 +82,7 @@ fn ride(run: u64, payload: f64) -> (DiagnosticCode, f64) {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn certificate_weak_drives_make_the_motion_slower_and_cause_no_fault() {
     let certificate = Certificate::new("weak drives", 18, 1200);
     let runs = |payload: f64| -> Vec<_> {

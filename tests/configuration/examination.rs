@@ -1,5 +1,7 @@
 //! Configurations that load but must not be run: drives, limits, legs, gravity, envelope, timeouts.
 
+use std::fs;
+
 use hexad::config::deployment::default_limits::derived_limits;
 use hexad::config::examination::Examination;
 use hexad::config::{Config, Violation};
@@ -8,25 +10,23 @@ use super::{FRIED, REFERENCE, SIX_THREE};
 
 const MOTION_BASE: &str = include_str!("../../config/motion_base.toml");
 const TSAI: &str = include_str!("../../config/tsai2000.toml");
+
+/// The text of a machine of `tests/data`.
+fn data(name: &str) -> String {
+    fs::read_to_string(hexad_support::data(name, "toml")).unwrap()
+}
+
 /// Machines of the test vectors.
-const OTHERS: [&str; 7] = [
-    include_str!("../data/ceiling.toml"),
-    include_str!("../data/gimbal.toml"),
-    include_str!("../data/scattered.toml"),
-    include_str!("../data/sideways_x_up.toml"),
-    include_str!("../data/tabletop.toml"),
-    include_str!("../data/telescope.toml"),
-    include_str!("../data/tilted.toml"),
-];
+fn others() -> impl Iterator<Item = String> {
+    ["ceiling", "gimbal", "scattered", "sideways_x_up", "tabletop", "telescope", "tilted"]
+        .into_iter()
+        .map(data)
+}
+
 /// Machines as they are built: from a piezo stage to the mount of a telescope.
-const BUILT: [&str; 6] = [
-    SIX_THREE,
-    include_str!("../data/hanging_chair.toml"),
-    include_str!("../data/hobby.toml"),
-    include_str!("../data/piezo.toml"),
-    include_str!("../data/plate_3m.toml"),
-    include_str!("../data/telescope_m2.toml"),
-];
+fn built() -> impl Iterator<Item = String> {
+    ["six_three", "hanging_chair", "hobby", "piezo", "plate_3m", "telescope_m2"].into_iter().map(data)
+}
 
 fn load(text: &str) -> Config {
     Config::parse(text, "test.toml").unwrap()
@@ -59,8 +59,9 @@ fn refused(file: &str, line: &str, words: &[&str]) {
 
 #[test]
 fn machines_in_order_are_valid_and_only_hanging_ones_are_warned_of() {
-    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].into_iter().chain(OTHERS).chain(BUILT) {
-        let (config, found) = (load(file), examine(file));
+    let own = [FRIED, REFERENCE, MOTION_BASE, TSAI].map(String::from).into_iter();
+    for file in own.chain(others()).chain(built()) {
+        let (config, found) = (load(&file), examine(&file));
         assert_eq!(text(&found.errors), [""; 0], "{}", config.name);
         let keys: Vec<_> = found.warnings.iter().map(|warning| warning.key.as_str()).collect();
         let hangs = ["ceiling", "hanging_chair", "telescope_m2"].contains(&config.name.as_str());
@@ -101,11 +102,8 @@ fn an_envelope_must_be_within_stroke_regular_and_held() {
     refused(&with(0.1, 0.4), "[envelope]", &["from home", "longer there than actuator.max_length_m"]);
     // Where the platform leans, one leg carries more than at home.
     let weak = base_with("max_force_n = 20000.0", "max_force_n = 4240.0") + &envelope(0.15, 0.01, 0.1);
-    refused(
-        &weak,
-        "max_force_n",
-        &["actuator.max_force_n = 4240: must be at least", "within [envelope] at "],
-    );
+    let words = ["actuator.max_force_n = 4240: must be at least", "within [envelope] at "];
+    refused(&weak, "max_force_n", &words);
     // Accelerations are a matter of the task, not of holding: a warning.
     let fast = examine(&format!("{MOTION_BASE}{}", envelope(0.05, 0.05, 20.0)));
     assert_eq!(text(&fast.errors), [""; 0]);
@@ -118,11 +116,8 @@ fn an_envelope_must_be_within_stroke_regular_and_held() {
 #[test]
 fn limits_that_the_drives_cannot_give_are_refused_with_those_that_they_can() {
     let with = |line: &str| format!("{MOTION_BASE}\n[limits]\n{line}\n");
-    refused(
-        &with("acceleration_m_s2 = 16.0"),
-        "acceleration_m_s2",
-        &["= 16: must be at most 14.9", "the drives can give"],
-    );
+    let words = ["= 16: must be at most 14.9", "the drives can give"];
+    refused(&with("acceleration_m_s2 = 16.0"), "acceleration_m_s2", &words);
     refused(&with("acceleration_rad_s2 = 25.0"), "acceleration_rad_s2", &["= 25: must be at most 21.8"]);
     // Each alone, but not both at once; and velocities, which the reference keeps.
     for (line, key, words) in [
@@ -155,11 +150,9 @@ fn defaults_of_limits_are_what_the_drives_can_give() {
         [("limits.velocity_rad_s", 1.2), ("limits.acceleration_rad_s2", 9.4), ("limits.jerk_rad_s3", 940.0)]
     );
     // Given by hand they are not derived, and the others are as before.
-    let by_hand = format!(
-        "{MOTION_BASE}\n[limits]\nvelocity_rad_s = 1.0\nacceleration_rad_s2 = 7.0\njerk_rad_s3 = 700\n"
-    );
-    assert_eq!(derived(&by_hand), []);
-    let telescope = load(OTHERS[5]).deployment.limits.reference;
+    let limits = "[limits]\nvelocity_rad_s = 1.0\nacceleration_rad_s2 = 7.0\njerk_rad_s3 = 700\n";
+    assert_eq!(derived(&format!("{MOTION_BASE}\n{limits}")), []);
+    let telescope = load(&data("telescope")).deployment.limits.reference;
     assert_eq!((telescope.position.velocity, telescope.orientation.velocity), (0.02, 0.029));
     assert_eq!((telescope.position.jerk, telescope.orientation.jerk), (280.0, 490.0));
 }
@@ -179,20 +172,19 @@ fn exchanged(file: &str, legs: [usize; 2]) -> String {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
 fn two_joints_of_neighbours_that_are_swapped_are_named() {
     let (mut missed, mut named) = (vec![], 0);
-    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].into_iter().chain(OTHERS) {
+    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].map(String::from).into_iter().chain(others()) {
         for first in 0..6 {
             for second in first + 1..6 {
-                let text = exchanged(file, [first, second]);
+                let text = exchanged(&file, [first, second]);
                 let Ok(config) = Config::parse(&text, "test.toml") else { continue };
                 let found = config.examine();
                 let key = format!("leg[{}].platform_m", second + 1);
-                let pair = format!("leg {} ", second + 1);
+                let words = [format!("leg {} ", second + 1), format!("leg {}", first + 1)];
                 let names = |found: &Violation| {
-                    found.key == key
-                        && found.to_string().contains(&pair)
-                        && found.to_string().contains(&format!("leg {}", first + 1))
+                    found.key == key && words.iter().all(|word| found.to_string().contains(word))
                 };
                 if found.errors.iter().chain(&found.warnings).any(names) {
                     named += 1;
@@ -202,7 +194,6 @@ fn two_joints_of_neighbours_that_are_swapped_are_named() {
             }
         }
     }
-    println!("{named} swaps named");
     assert_eq!(missed, [], "beside {named} pairs");
     assert!(named >= 90, "{named}: the others do not load");
 }
@@ -244,15 +235,12 @@ fn angles_after_positions_are_named_where_the_stroke_admits_both() {
         table["home"]["pose"].as_array_mut().unwrap().rotate_left(3);
         Config::parse(&table.to_string(), "test.toml")
     };
-    let warnings = exchanged(OTHERS[6]).unwrap().examine().warnings;
-    let named = |found: &str| {
-        found.contains("alpha, beta, gamma [rad], then x, y, z [m]: at [0.0, 0.0, 0.0, 0.0, 0.0, 0.")
-    };
-    assert!(
-        text(&warnings).iter().any(|warning| warning.starts_with("home.pose") && named(warning)),
-        "{warnings:#?}"
-    );
-    let refused = exchanged(BUILT[2]).unwrap_err().to_string();
+    let warnings = exchanged(&data("tilted")).unwrap().examine().warnings;
+    let words = "alpha, beta, gamma [rad], then x, y, z [m]: at [0.0, 0.0, 0.0, 0.0, 0.0, 0.";
+    let named = |found: &str| found.contains(words);
+    let mut warnings = text(&warnings).into_iter();
+    assert!(warnings.any(|warning| warning.starts_with("home.pose") && named(&warning)));
+    let refused = exchanged(&data("hobby")).unwrap_err().to_string();
     assert!(refused.lines().count() == 1 && named(&refused), "{refused}");
 }
 

@@ -7,14 +7,10 @@ use hexad::config::changes::changes;
 use hexad::config::frames::FrameKind;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{FRIED, violations};
+use super::{FRIED, messages};
 
 const FRAMES: &str = "[[frame]]\nname = 'vertex'\nkind = 'tool'\npose = [0, 0, 0, 0, 0, 0.35]\n\
                       [[frame]]\nname = \"optics\"\nkind = \"work\"\npose = [0, 0, 1.5707963267948966, 1, 2, 3]\n";
-
-fn messages(text: &str) -> Vec<String> {
-    violations(text).iter().map(ToString::to_string).collect()
-}
 
 fn with(frames: &str) -> String {
     FRIED.to_owned() + frames

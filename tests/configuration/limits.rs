@@ -1,22 +1,15 @@
 //! Limits of the reference and of feedback, and what becomes of setpoints beyond them.
 
+use hexad::config::Config;
 use hexad::config::deployment::{Deployment, DeploymentLimits};
-use hexad::config::{Config, Violation};
 use hexad::control::parameters::ViolationPolicy;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::kinematic_state::KinematicState;
 
-use super::{FRIED, violations};
+use super::{FRIED, refused_each, violations};
 
 fn deployment(text: &str) -> Deployment {
     Config::parse(&format!("{FRIED}{text}"), "test.toml").unwrap().deployment
-}
-
-/// Asserts that a section with one key is refused with this message, in the line of the key.
-fn refused(section: &str, line: &str, bound: &str) {
-    let text = format!("{FRIED}[{section}]\n{line}\n");
-    let error = Config::parse(&text, "test.toml").unwrap_err().to_string();
-    assert_eq!(error, format!("test.toml:{}: {section}.{line}: {bound}", text.lines().count()));
 }
 
 /// Least distance of home's leg lengths from the ends of the stroke.
@@ -34,15 +27,10 @@ fn setpoints_beyond_the_limits_end_in_a_stop_unless_the_policy_is_limit() {
     let policy = |name: &str| deployment(&format!("[setpoint]\non_violation = \"{name}\"\n"));
     assert_eq!(policy("stop").setpoint.on_violation, ViolationPolicy::Stop);
     assert_eq!(policy("limit").setpoint.on_violation, ViolationPolicy::Limit);
-    for value in ["\"clip\"", "\"Limit\"", "\"\"", "true", "1"] {
-        refused("setpoint", &format!("on_violation = {value}"), "must be one of \"stop\", \"limit\"");
-    }
-    let [violation] = violations(&format!("{FRIED}[setpoint]\npolicy = 1\n")).try_into().unwrap();
-    let Violation { key, bound, .. } = &violation;
-    assert_eq!(
-        (key.as_str(), bound.as_str()),
-        ("setpoint.policy", "unknown key, must be one of: on_violation, approach, on_return")
-    );
+    let message = |value| format!("setpoint.on_violation = {value}: must be one of \"stop\", \"limit\"");
+    refused_each(FRIED, ["\"clip\"", "\"Limit\"", "\"\"", "true", "1"].map(message));
+    let unknown = "setpoint.policy = 1: unknown key, must be one of: on_violation, approach, on_return";
+    refused_each(FRIED, [unknown]);
 }
 
 #[test]
@@ -57,10 +45,13 @@ fn velocity_errors_are_bounded_by_a_share_of_the_limits_unless_given() {
     let given = "[control]\nfollowing_velocity_m_s = 0.01\nfollowing_velocity_rad_s = 7\n";
     assert_eq!(bounds(given), (0.01, 7.0));
     for key in ["following_velocity_m_s", "following_velocity_rad_s"] {
-        refused("control", &format!("{key} = 0"), "must be greater than 0");
-        refused("control", &format!("{key} = -0.3"), "must be greater than 0");
-        refused("control", &format!("{key} = inf"), "must be a finite number, at most 1e12 in magnitude");
-        refused("control", &format!("{key} = \"0.3\""), "must be a number, greater than 0");
+        let rows = [
+            "0: must be greater than 0",
+            "-0.3: must be greater than 0",
+            "inf: must be a finite number, at most 1e12 in magnitude",
+            "\"0.3\": must be a number, greater than 0",
+        ];
+        refused_each(FRIED, rows.map(|row| format!("control.{key} = {row}")));
     }
     // What follows from a refused limit is not reported again.
     let found = violations(&format!("{FRIED}[limits]\nvelocity_m_s = -1\n"));
@@ -71,10 +62,10 @@ fn velocity_errors_are_bounded_by_a_share_of_the_limits_unless_given() {
 fn feedback_may_add_half_of_the_limits_unless_given() {
     assert_eq!(deployment("").limits.feedback_scale, 0.5);
     assert_eq!(deployment("[limits]\nfeedback_scale = 3\n").limits.feedback_scale, 3.0);
-    for value in ["0", "-0.5"] {
-        refused("limits", &format!("feedback_scale = {value}"), "must be greater than 0");
-    }
-    refused("limits", "feedback_scale = nan", "must be a finite number, at most 1e12 in magnitude");
+    let rows = "limits.feedback_scale = 0: must be greater than 0
+        limits.feedback_scale = -0.5: must be greater than 0
+        limits.feedback_scale = nan: must be a finite number, at most 1e12 in magnitude";
+    refused_each(FRIED, rows.lines());
 }
 
 #[test]
@@ -88,10 +79,9 @@ fn the_scale_slows_motions_and_changes_no_other_bound() {
     assert_eq!(slow.limits.in_force().orientation, full.limits.reference.orientation.scaled(0.05));
     assert_eq!((slow.control, slow.timeouts), (full.control, full.timeouts));
     assert_eq!(slow.limits, DeploymentLimits { scale: 0.05, ..full.limits });
-    for value in ["0.049", "1.01", "0", "-1"] {
-        refused("limits", &format!("scale = {value}"), "must be in [0.05, 1]");
-    }
-    refused("limits", "scale = \"10 %\"", "must be a number, in [0.05, 1]");
+    let beyond = ["0.049", "1.01", "0", "-1"];
+    refused_each(FRIED, beyond.map(|value| format!("limits.scale = {value}: must be in [0.05, 1]")));
+    refused_each(FRIED, ["limits.scale = \"10 %\": must be a number, in [0.05, 1]"]);
 }
 
 #[test]
@@ -101,20 +91,16 @@ fn disturbances_are_allowed_as_given_or_all() {
         (limits.payload_change_kg, limits.disturbance_step_m_s2)
     };
     assert_eq!(allowed(""), (None, None));
-    assert_eq!(
-        allowed("[limits]\npayload_change_kg = 0.001\ndisturbance_step_m_s2 = 1e12\n"),
-        (Some(0.001), Some(1e12))
-    );
+    let given = "[limits]\npayload_change_kg = 0.001\ndisturbance_step_m_s2 = 1e12\n";
+    assert_eq!(allowed(given), (Some(0.001), Some(1e12)));
     let all = "[limits]\npayload_change_kg = inf\ndisturbance_step_m_s2 = +inf\n";
     assert_eq!(allowed(all), (Some(f64::INFINITY), Some(f64::INFINITY)));
     for key in ["payload_change_kg", "disturbance_step_m_s2"] {
-        for value in ["0", "-1", "-inf", "nan", "1e13"] {
-            let bound = "must be greater than 0 and at most 1e12, or inf";
-            refused("limits", &format!("{key} = {value}"), bound);
-        }
-        let bound = "must be a number, greater than 0 and at most 1e12, or inf";
-        refused("limits", &format!("{key} = \"inf\""), bound);
-        refused("limits", &format!("{key} = 1e-13"), "must be at least 1e-12");
+        let bound = "greater than 0 and at most 1e12, or inf";
+        let beyond = ["0", "-1", "-inf", "nan", "1e13"];
+        refused_each(FRIED, beyond.map(|value| format!("limits.{key} = {value}: must be {bound}")));
+        refused_each(FRIED, [format!("limits.{key} = \"inf\": must be a number, {bound}")]);
+        refused_each(FRIED, [format!("limits.{key} = 1e-13: must be at least 1e-12")]);
     }
 }
 
@@ -124,7 +110,7 @@ fn the_margin_of_the_stroke_is_at_most_that_of_home() {
     // Half a percent of 0.85 m to 1.6 m.
     assert!((margin("") - 0.005 * 0.75).abs() < 1e-15);
     assert_eq!(margin("[limits]\nstroke_margin_m = 0\n"), 0.0);
-    refused("limits", "stroke_margin_m = -0.001", "must be at least 0");
+    refused_each(FRIED, ["limits.stroke_margin_m = -0.001: must be at least 0"]);
     let found = violations(&format!("{FRIED}[limits]\nstroke_margin_m = 0.7\n"));
     let [violation] = found.as_slice() else { panic!("{found:#?}") };
     assert_eq!((violation.key.as_str(), violation.value.as_deref()), ("limits.stroke_margin_m", Some("0.7")));

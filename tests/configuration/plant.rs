@@ -1,13 +1,13 @@
 //! `[plant]` and its imperfections: where values go, and what is refused.
 
-use hexad::config::{Config, Violation};
+use hexad::config::Config;
 use hexad::model::rigid::Wrench;
 use hexad::plant::imperfections::{
     BuildErrors, DriveErrors, ElasticLeg, ExternalWrench, Friction, Imperfections, SensorErrors,
 };
 use nalgebra::Vector3;
 
-use super::violations;
+use super::{messages, refused_each};
 
 const MOTION_BASE: &str = include_str!("../../config/motion_base.toml");
 
@@ -64,57 +64,41 @@ fn imperfections_arrive_where_they_belong() {
 
 #[test]
 fn imperfections_are_refused_with_key_value_and_bound() {
-    let messages = |text: &str| -> Vec<_> { violations(text).iter().map(Violation::to_string).collect() };
-    let refused = |from: &str, to: &str, expected: &[&str]| {
-        assert_eq!(EVERYTHING.matches(from).count(), 1, "{from}");
-        let text = format!("{MOTION_BASE}{}", EVERYTHING.replace(from, to));
-        assert_eq!(messages(&text), expected, "after {to}");
-    };
-    refused("seed = 7", "seed = -1", &["plant.seed = -1: must be an integer in [0, 2147483647]"]);
-    refused("um = 0.5", "um = 0", &["plant.tolerance_um = 0: must be greater than 0 and at most 1000"]);
-    refused("1500.5", "1e5", &["plant.drive.dead_time_us = 1e5: must be in [0, 10000]"]);
-    refused("z = 80", "z = 0", &["plant.drive.bandwidth_hz = 0: must be greater than 0"]);
-    refused("coulomb_n = 3", "coulomb_n = -3", &["plant.friction.coulomb_n = -3: must be at least 0"]);
-    refused("s = 0.05", "s = 0", &["plant.friction.stribeck_speed_m_s = 0: must be greater than 0"]);
-    refused("= 2e-6", "= -2e-6", &["plant.sensor.rate_step_m_s = -2e-6: must be at least 0"]);
-    refused("[1, 2, 3]", "3", &["plant.build.payload_position_m = 3: must be an array of 3 numbers"]);
-    refused(
-        "[7, 8, 9]",
-        "[7, 8, inf]",
-        &["plant.external.torque_n_m[3] = inf: must be a finite number, at most 1e12 in magnitude"],
-    );
-    refused(
-        "frequency_hz",
-        "frequency",
-        &[
-            "plant.external.frequency = 10: unknown key, probably frequency_hz, must be one of: force_n, torque_n_m, frequency_hz",
-        ],
-    );
-    refused(
-        "stiffness_n_m = 5e7\n",
-        "",
-        &[
+    let everything = format!("{MOTION_BASE}{EVERYTHING}");
+    let rows = "plant.seed = -1: must be an integer in [0, 2147483647]
+        plant.tolerance_um = 0: must be greater than 0 and at most 1000
+        plant.drive.dead_time_us = 1e5: must be in [0, 10000]
+        plant.drive.bandwidth_hz = 0: must be greater than 0
+        plant.friction.coulomb_n = -3: must be at least 0
+        plant.friction.stribeck_speed_m_s = 0: must be greater than 0
+        plant.sensor.rate_step_m_s = -2e-6: must be at least 0
+        plant.build.payload_position_m = 3: must be an array of 3 numbers
+        plant.external.torque_n_m[3] = inf: must be a finite number, at most 1e12 in magnitude
+        plant.external.frequency = 10: unknown key, probably frequency_hz, must be one of: force_n, torque_n_m, frequency_hz";
+    refused_each(&everything, rows.lines());
+    for (from, to, message) in [
+        (
+            "stiffness_n_m = 5e7\n",
+            "",
             "plant.leg.backlash_m = 7e-5: must be 0 without stiffness_n_m: the flanks of a backlash are springs",
-        ],
-    );
-    // Too fast to be simulated in real time.
-    refused(
-        "viscous_n_s_m = 2",
-        "viscous_n_s_m = 1e8",
-        &[
+        ),
+        // Too fast to be simulated in real time.
+        (
+            "viscous_n_s_m = 2\n",
+            "viscous_n_s_m = 1e8\n",
             "plant.step_us = 3.99994 needed by plant.drive, plant.leg and plant.friction: must be at least 10: \
-           more tolerance_um, a softer leg, less friction",
-        ],
-    );
-    let massless = MOTION_BASE.replace("reflected_mass_kg = 400.0", "reflected_mass_kg = 0");
-    assert_eq!(
-        messages(&format!("{massless}{EVERYTHING}")),
-        [
+             more tolerance_um, a softer leg, less friction",
+        ),
+        (
+            "reflected_mass_kg = 400.0",
+            "reflected_mass_kg = 0",
             "plant.leg.stiffness_n_m = 5e7: must not be given with actuator.reflected_mass_kg = 0: a drive behind a \
-          spring has mass"
-        ]
-    );
-    // What is wrong with the machine is not held against its plant.
-    let broken = MOTION_BASE.replace("mass_kg = 1150.0", "mass_kg = -1");
-    assert_eq!(messages(&format!("{broken}{EVERYTHING}")), ["platform.mass_kg = -1: must be greater than 0"]);
+             spring has mass",
+        ),
+        // What is wrong with the machine is not held against its plant.
+        ("mass_kg = 1150.0", "mass_kg = -1", "platform.mass_kg = -1: must be greater than 0"),
+    ] {
+        assert_eq!(everything.matches(from).count(), 1, "{from}");
+        assert_eq!(messages(&everything.replace(from, to)), [message]);
+    }
 }

@@ -4,86 +4,77 @@ use hexad::config::{Config, ConfigError, Violation};
 
 use super::{REFERENCE, violations};
 
-#[derive(Clone, Debug)]
-enum Step {
-    Key(String),
-    Index(usize),
-}
-
-/// Every table of a document, with the path that leads to it.
-fn tables(value: &toml::Value, path: Vec<Step>) -> Vec<Vec<Step>> {
-    let children: Vec<(Step, &toml::Value)> = match value {
+/// Visits every table of a document.
+fn each_table(value: &mut toml::Value, visit: &mut dyn FnMut(&mut toml::Table)) {
+    match value {
         toml::Value::Table(table) => {
-            table.iter().map(|(key, value)| (Step::Key(key.clone()), value)).collect()
+            visit(table);
+            table.iter_mut().for_each(|(_, value)| each_table(value, visit));
         }
-        toml::Value::Array(items) => {
-            items.iter().enumerate().map(|(i, value)| (Step::Index(i), value)).collect()
-        }
-        _ => Vec::new(),
-    };
-    let here = value.is_table().then(|| path.clone());
-    let below = children.into_iter().flat_map(|(step, child)| {
-        let path = path.iter().cloned().chain([step]).collect();
-        tables(child, path)
-    });
-    here.into_iter().chain(below).collect()
+        toml::Value::Array(items) => items.iter_mut().for_each(|item| each_table(item, visit)),
+        _ => {}
+    }
 }
 
-fn table_at<'a>(document: &'a mut toml::Value, path: &[Step]) -> &'a mut toml::Table {
-    let inner = path.iter().fold(document, |value, step| match step {
-        Step::Key(key) => value.get_mut(key).unwrap(),
-        Step::Index(i) => value.get_mut(i).unwrap(),
+/// The reference with another k-th table; none behind the last.
+fn with_table(k: usize, mut change: impl FnMut(&mut toml::Table)) -> Option<String> {
+    let mut document = toml::Value::Table(REFERENCE.parse().unwrap());
+    let mut count = 0;
+    each_table(&mut document, &mut |table| {
+        if count == k {
+            change(table);
+        }
+        count += 1;
     });
-    inner.as_table_mut().unwrap()
+    (k < count).then(|| toml::to_string(&document).unwrap())
+}
+
+/// The keys of each table.
+fn keys() -> impl Iterator<Item = (usize, Vec<String>)> {
+    (0..).map_while(|k| {
+        let mut keys = vec![];
+        with_table(k, |table| keys.extend(table.keys().cloned()))?;
+        Some((k, keys))
+    })
 }
 
 #[test]
 fn the_reference_has_every_key_that_the_reader_knows() {
-    let document = toml::Value::Table(REFERENCE.parse().unwrap());
-    for path in tables(&document, Vec::new()) {
-        let mut changed = document.clone();
-        let table = table_at(&mut changed, &path);
-        table.insert("no_such_key".into(), 1.into());
-        let keys: Vec<String> = table.keys().cloned().collect();
-        let found = violations(&toml::to_string(&changed).unwrap());
-        let [violation] = found.as_slice() else { panic!("{path:?}: {found:#?}") };
+    for (k, keys) in keys() {
+        let unknown = |table: &mut toml::Table| drop(table.insert("no_such_key".into(), 1.into()));
+        let found = violations(&with_table(k, unknown).unwrap());
+        let [violation] = found.as_slice() else { panic!("{keys:?}: {found:#?}") };
         let (_, known) = violation.bound.split_once("must be one of: ").unwrap();
         for key in known.split(", ") {
             let written = keys.iter().any(|k| k == key) || REFERENCE.contains(&format!("\n# {key} = "));
-            assert!(written, "{path:?} has no {key}");
+            assert!(written, "{violation} has no {key}");
         }
     }
 }
 
 #[test]
 fn the_reference_gives_the_defaults() {
-    let document = toml::Value::Table(REFERENCE.parse().unwrap());
-    let read = |document: &toml::Value| {
-        let config = Config::parse(&toml::to_string(document).unwrap(), "reference.toml")?;
+    let read = |text: &str| {
+        let config = Config::parse(text, "reference.toml")?;
         // The frames are examples; their default is none.
         Ok(Config { text: String::new(), frames: vec![], ..config })
     };
-    let all = format!("{:?}", read(&document).unwrap());
+    let all = format!("{:?}", read(&with_table(0, |_| ()).unwrap()).unwrap());
     let mut optional = Vec::new();
-    for path in tables(&document, Vec::new()) {
-        let keys: Vec<String> = table_at(&mut document.clone(), &path).keys().cloned().collect();
-        for key in keys {
-            let mut changed = document.clone();
-            table_at(&mut changed, &path).remove(&key);
-            match read(&changed) {
-                Ok(config) => {
-                    assert_eq!(format!("{config:?}"), all, "{key} of {path:?} is not the default");
-                    optional.push(key);
-                }
-                Err(ConfigError::Invalid { violations, .. }) => {
-                    let missing = |v: &Violation| v.bound.starts_with("missing") || v.key == "leg";
-                    assert!(violations.iter().all(missing), "{key} of {path:?}: {violations:#?}");
-                }
-                Err(other) => panic!("{other}"),
+    for (k, key) in keys().flat_map(|(k, keys)| keys.into_iter().map(move |key| (k, key))) {
+        match read(&with_table(k, |table| drop(table.remove(&key))).unwrap()) {
+            Ok(config) => {
+                assert_eq!(format!("{config:?}"), all, "{key} of table {k} is not the default");
+                optional.push(key);
             }
+            Err(ConfigError::Invalid { violations, .. }) => {
+                let missing = |v: &Violation| v.bound.starts_with("missing") || v.key == "leg";
+                assert!(violations.iter().all(missing), "{key} of table {k}: {violations:#?}");
+            }
+            Err(other) => panic!("{other}"),
         }
     }
-    // 11 sections with 13 + 15 + 3 + 2 + 12 + 3 + 3 + 3 + 1 + 5 + 0 keys, 5 of the actuator, 3 of the inertia, one for each leg, the frames, 6 sections
+    // 11 sections with 13 + 15 + 3 + 2 + 12 + 3 + 3 + 3 + 1 + 5 + 0 keys, 5 of the actuator, 3 of the inertia, one of home, one for each leg, the frames, 6 sections
     // of the plant with 2 + 4 + 2 + 4 + 3 + 3 keys.
-    assert_eq!(optional.len(), 11 + 60 + 5 + 3 + 6 + 1 + 6 + 18, "{optional:?}");
+    assert_eq!(optional.len(), 11 + 60 + 5 + 3 + 1 + 6 + 1 + 6 + 18, "{optional:?}");
 }

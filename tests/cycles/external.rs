@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use heapless::spsc::Queue;
 use hexad::control::controller::Output;
 use hexad::control::signals::inputs::{Input, Measurement};
-use hexad::daemon::cycle::{CycleInput, CycleRecord, IoSide};
+use hexad::daemon::cycle::{CycleInput, CycleRecord, IoSide, run};
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;
-use hexad::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode, Timing, run};
+use hexad::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use heapless::spsc::Queue;
 use hexad::control::controller::Output;
 use hexad::control::signals::inputs::Input;
-use hexad::daemon::cycle::CycleRecord;
+use hexad::daemon::cycle::{CycleRecord, run};
 use hexad::messages::LoopCounters;
 use hexad::realtime::clock::Clock;
-use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing, run};
+use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 

@@ -9,9 +9,9 @@ use hexad::control::signals::diagnostic::DiagnosticCode::{
 };
 use hexad::control::signals::state::State;
 
-use super::common::observed::Rates;
 use super::disturbances::Disturbance;
 use super::situations::Situation;
+use hexad_support::rig::Rates;
 
 /// What becomes of it.
 #[derive(Clone, Copy, Debug)]

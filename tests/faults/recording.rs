@@ -8,7 +8,7 @@ use hexad::control::signals::state::State;
 use hexad::model::rigid::{Acceleration, Pose, Twist};
 use hexad::model::task::TaskState;
 
-use super::common::largest;
+use hexad_support::largest;
 
 /// One cycle. Pose, twist and acceleration are the platform's own, at the end of it.
 #[derive(Clone, Copy)]

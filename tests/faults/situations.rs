@@ -11,10 +11,9 @@ use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
-use super::common::deployed;
-use super::common::observed::Rates;
-use super::common::rig::{Rig, parameters};
 use super::world::{Source, World};
+use hexad_support::deployed;
+use hexad_support::rig::{Rates, Rig, parameters};
 
 /// In the order of the columns of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,6 +154,6 @@ fn moving(world: &mut World) {
     let scene = fit(&world.machine, BuiltInMotion::Sines, 8.0);
     world.source = Source::Plays(scene, world.rig.now_ns);
     world.run(1900);
-    let speed = world.rig.simulator.state().twist.linear.norm();
+    let speed = world.rig.simulator().state().twist.linear.norm();
     assert!(speed > 0.2, "{speed}");
 }

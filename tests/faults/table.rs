@@ -14,13 +14,13 @@ use hexad::plant::simulator::Brakes;
 use rayon::prelude::*;
 
 use super::cells::{Bounds, Cell, LONG, Row, in_mode, with_rates};
-use super::common::certificate;
-use super::common::observed::Rates;
 use super::disturbances::{Disturbance, Moment};
 use super::recording::Peaks;
 use super::rows::{ROWS, ROWS_UNDER_LIMIT};
 use super::situations::Situation;
 use super::world::{Source, World};
+use hexad_support::certificate;
+use hexad_support::rig::Rates;
 
 /// Cycles of each cell: a second for which the daemon may be held, and a stop after it; or the way home.
 const CYCLES: u64 = 1600;
@@ -134,7 +134,7 @@ fn complaints(
     if !moves_on && rest_s > at_most {
         wrong.push(format!("at rest after {rest_s} s, not {at_most}"));
     }
-    let hit = matches!(outcome.world.rig.simulator.brakes(), Brakes::EndStop { .. });
+    let hit = matches!(outcome.world.rig.simulator().brakes(), Brakes::EndStop { .. });
     if hit {
         wrong.push("hit an end stop".into());
     }

@@ -13,12 +13,12 @@ use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::FittedMotion;
 use hexad::motion::minimum_jerk::{rise, straight_move};
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::simulator::Simulator;
+use hexad::plant::hardware::Hardware;
+use hexad::plant::imperfections::Imperfections;
 use nalgebra::Vector6;
 
-use super::common::observed::Rates;
-use super::common::rig::Rig;
 use super::recording::{Recording, Sample};
+use hexad_support::rig::{Rates, Rig};
 
 /// Where setpoints come from.
 #[derive(Clone)]
@@ -67,7 +67,7 @@ pub struct World {
 
 impl World {
     pub fn new(rig: Rig, machine: &Machine, parameters: Parameters) -> Self {
-        let dynamics = ForwardDynamics::new(rig.simulator.machine());
+        let dynamics = ForwardDynamics::new(rig.simulator().machine());
         Self {
             rig,
             source: Source::Still(TaskState::at_rest(machine.home)),
@@ -148,7 +148,7 @@ impl World {
 
     /// X of the platform.
     pub fn x(&self) -> Vector6<f64> {
-        task_coordinates(&self.rig.simulator.state().pose, &self.machine.home).into()
+        task_coordinates(&self.rig.simulator().state().pose, &self.machine.home).into()
     }
 
     /// The source stands where the platform does.
@@ -167,10 +167,10 @@ impl World {
 
     /// The platform stands where it is, at once, and stays.
     pub fn hold(&mut self) {
-        let pose = self.rig.simulator.state().pose;
-        let mut standing = self.rig.simulator.machine().clone();
+        let pose = self.rig.simulator().state().pose;
+        let mut standing = self.rig.simulator().machine().clone();
         standing.home = task_coordinates(&pose, &standing.home);
-        self.rig.simulator = Simulator::new(&standing, 9.81, 1e-3);
+        self.rig.put(Hardware::new(&standing, 9.81, 1e-3, f64::INFINITY, &Imperfections::default()));
         self.grip = Grip::Held;
     }
 
@@ -198,7 +198,7 @@ impl World {
     }
 
     fn motion(&self) -> Motion {
-        let state = self.rig.simulator.state();
+        let state = self.rig.simulator().state();
         Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() }
     }
 
@@ -220,7 +220,7 @@ impl World {
     }
 
     fn record(&mut self, now_ns: u64, output: Option<Output>) {
-        let state = self.rig.simulator.state();
+        let state = self.rig.simulator().state();
         let acceleration =
             self.rig.force.and_then(|force| self.dynamics.acceleration(&state.pose, &state.twist, &force));
         self.recording.push(Sample {

@@ -1,15 +1,7 @@
 //! `hexad advise` as it is used.
 
-use std::fmt::Write;
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-use hexad::analysis::envelope::EnvelopeBounds;
-use tempfile::TempDir;
-
-use super::common::{Table, data, machine};
 use super::scenes::{camera, moog};
+use super::*;
 
 fn advise(config: &Path, trajectory: Option<&Path>) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
@@ -59,36 +51,17 @@ fn row(text: &str, fidelity: &str) -> [f64; 7] {
     numbers.try_into().unwrap()
 }
 
-fn without_times(text: &str) -> String {
-    let mut stripped = String::new();
-    for line in text.lines() {
-        let cut = ["gravity ", "massless", "lumped", "no-velocity", "rigid", "exact"]
-            .iter()
-            .any(|fidelity| line.starts_with(fidelity));
-        let words: Vec<_> = line.split_whitespace().collect();
-        let kept = if cut { words[..7].join(" ") + &words[8..].join(" ") } else { words.join(" ") };
-        writeln!(stripped, "{kept}").unwrap();
-    }
-    stripped
-}
-
 #[test]
 fn a_telescope_and_a_motion_base_need_different_models() {
     let folder = TempDir::new().unwrap();
     let slow = said(&with(&folder, "telescope", &section(&camera())), None);
     let fast = said(&with(&folder, "motion_base", &section(&moog())), None);
-    println!("{slow}\n{fast}");
     assert_eq!(recommended(&slow), "no-velocity");
     assert_eq!(recommended(&fast), "exact");
     // A user sees why.
     let [.., share, _] = row(&slow, "no-velocity");
     assert!(share < 0.001, "{slow}");
-    assert!(
-        slow.contains(
-            "leaving out velocity terms and spin costs 0.00549 N, 8.12e-5 %: the largest found, not a bound"
-        ),
-        "{slow}"
-    );
+    assert!(slow.contains("velocity terms and spin costs 0.00549 N, 8.12e-5 %: the largest found"), "{slow}");
     assert!(slow.contains("leaving out extent of the legs would cost 0.739 %"), "{slow}");
     let [.., share, _] = row(&fast, "no-velocity");
     assert!((2.0..5.0).contains(&share), "{fast}");
@@ -113,12 +86,6 @@ fn the_tolerance_decides() {
         recommended(&text).to_string()
     });
     assert_eq!(choices, ["exact", "rigid-legs", "rigid-legs", "no-velocity", "lumped-legs", "massless-legs"]);
-}
-
-#[test]
-fn advice_is_the_same_twice_but_for_the_time() {
-    let config = data("tsai2000", "toml");
-    assert_eq!(without_times(&said(&config, None)), without_times(&said(&config, None)));
 }
 
 /// The vectors have forces without spin by another program: what the fidelity must be off by.
@@ -177,24 +144,8 @@ fn rows_out_of_reach_are_passed_over_and_nothing_but_them_is_refused() {
     let none = advise(&config, Some(&put_away(1..201)));
     let message = String::from_utf8(none.stderr).unwrap();
     assert_eq!(none.status.code(), Some(2), "{message}");
-    assert!(
-        message
-            .contains("no row can be evaluated: 200 are outside the actuators' stroke, 0 at singular poses"),
-        "{message}"
-    );
+    let words = "no row can be evaluated: 200 are outside the actuators' stroke, 0 at singular poses";
+    assert!(message.contains(words), "{message}");
     let absent = advise(&config, Some(Path::new("absent.csv")));
     assert_eq!(absent.status.code(), Some(2));
-}
-
-#[test]
-fn a_bad_envelope_is_refused_by_key() {
-    let folder = TempDir::new().unwrap();
-    let sections = section(&moog()).replace("velocity = [0.5", "velocity = [-0.5");
-    let output = advise(&with(&folder, "motion_base", &sections), None);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(
-        message.contains("envelope.velocity[1] = -0.5") && message.contains("must be at least 0"),
-        "{message}"
-    );
 }

@@ -1,7 +1,6 @@
 //! The points of an envelope: ends, evenness, corners.
 
-use hexad::analysis::envelope::{CORNER_COUNT, DIMENSIONS, EnvelopeBounds, EnvelopePoint, MotionEnvelope};
-use nalgebra::Vector6;
+use super::*;
 
 const HOME: [f64; 6] = [0.5, 0.0, 0.0, 0.0, 0.0, 1.0];
 

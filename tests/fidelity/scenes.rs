@@ -1,10 +1,6 @@
 //! Machines and what they are asked to do.
 
-use hexad::analysis::envelope::{EnvelopeBounds, MotionEnvelope};
-use hexad::analysis::reachable_envelope;
-use hexad::model::active_forces::InverseDynamics;
-
-use super::common::machine;
+use super::*;
 
 /// A motion base of the one-tonne class: Moog 6DOF2000E, at most 22 deg in yaw, upward heave acceleration.
 pub fn moog() -> EnvelopeBounds {

@@ -1,13 +1,16 @@
 //! A net for every change of the controller: recorded inputs, and one hash of all bits of the outputs per 100 cycles.
 //!
-//! Each stream is 2,000 inputs of a controller that were recorded in closed loop (`streams/NAME.bin`), and its configuration
-//! (`NAME.toml`). The outputs are computed again, with the arithmetic of AVX2 and with that of SSE4.2, and their hashes compared with
-//! `hashes.txt`. The streams cover every state, request, control mode and loop fidelity, both policies, slow and fast loops and nearly
-//! every diagnostic, which a test checks.
+//! Each stream is a recording of 2,000 cycles with its configuration, in closed loop, without the outputs (`streams/NAME.mcap.gz`). The
+//! outputs are computed again, with the arithmetic of AVX2 and with that of SSE4.2, and their hashes compared with `hashes.txt`. The
+//! streams cover every state, request, control mode and loop fidelity, both policies, slow and fast loops and nearly every diagnostic,
+//! which a test checks. Another computes recordings with outputs, and replays them.
 //!
 //! A changed hash is a changed bit of what the controller says, and needs a commit of its own that says why:
-//! `HEXAD_WRITE_HASHES=1 cargo test --test shipped golden` writes them anew. What only renames or moves code changes none: neither inputs
-//! nor outputs are stored by the names of Rust ([`input_words`], [`output_hash`]).
+//! `HEXAD_WRITE_HASHES=1 cargo test --test shipped golden` writes them anew. What only renames or moves code changes none: outputs are
+//! not stored by the names of Rust ([`output_hash`]). After a change of the layout of `CycleMessage` the files must be written anew from
+//! inputs that the version before has read; the hashes show whether each input is the same.
+
+#![allow(clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
 use std::env;
 use std::sync::LazyLock;
@@ -15,14 +18,13 @@ use std::sync::LazyLock;
 use fearless_simd::Level;
 use hexad::daemon::replay::repeating_level;
 
-use crate::common::not_run::not_run;
+use hexad_support::not_run::not_run;
 
-mod codec;
 mod coverage;
 mod hashes;
-mod input_words;
 mod output_hash;
 mod recording;
+mod replays;
 mod stream;
 
 use hashes::{BLOCK, Table};
@@ -65,7 +67,7 @@ fn difference(
 #[test]
 fn every_output_has_the_bits_that_were_recorded() {
     assert!(AVX2.len() >= LEAST_STREAMS, "{} streams", AVX2.len());
-    let key = |run: &Run, arithmetic: &str| (run.stream.name.clone(), arithmetic.to_owned());
+    let key = |run: &Run, arithmetic: &str| (run.stream.info.name.clone(), arithmetic.to_owned());
     let mut found: Table = AVX2.iter().map(|run| (key(run, "Avx2"), hashes::of(&run.outputs))).collect();
     match sse4_2() {
         Some(level) => {
@@ -75,7 +77,7 @@ fn every_output_has_the_bits_that_were_recorded() {
     }
     let recorded = hashes::read();
     // Those of a processor with other instructions, too.
-    let is_known = |name: &String| AVX2.iter().any(|run| run.stream.name == *name);
+    let is_known = |name: &String| AVX2.iter().any(|run| run.stream.info.name == *name);
     if env::var_os("HEXAD_WRITE_HASHES").is_some() {
         let kept = recorded.into_iter().filter(|((name, _), _)| is_known(name));
         hashes::write(&kept.chain(found).collect());

@@ -1,28 +1,36 @@
-//! Streams in files: inputs in `NAME.bin`, the configuration of their controller in `NAME.toml`.
+//! Streams in files: recordings as hexad writes them, with gzip, whose outputs are zero.
 //!
-//! A `.bin` is a column of the file's words after the other, each of [`CYCLES`] words ([`codec`], [`input_words`]).
+//! The outputs would make a file four times as large, and every change of the controller would make them wrong; `hashes.txt` is about them.
+//! `gunzip` makes a recording that `hexad convert`, `report` and `replay` read; `replay` computes its cycles and names every output as different.
 
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::{fs, thread};
+use std::{io, thread};
 
 use fearless_simd::Level;
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Output};
+use hexad::control::controller::Output;
 use hexad::control::signals::inputs::Input;
+use hexad::daemon::recorder::instruction_set;
+use hexad::daemon::replay::recorded_controller;
+use hexad::daemon::version;
+use hexad::messages::CycleMessage;
 use hexad::realtime::setup::denormals;
+use hexad::recording::file::RecordingFile;
+use hexad::recording::reader::{Recording, Summary};
+use hexad::recording::{Item, RunInfo};
+use hexad_support::rig::parameters;
 use rayon::prelude::*;
-
-use super::codec;
-use super::input_words::{self, Row, WORDS};
-use crate::common::rig::parameters;
+use tempfile::NamedTempFile;
 
 /// Cycles of each stream.
 pub const CYCLES: usize = 2000;
 
 pub struct Stream {
-    pub name: String,
-    /// Text of the configuration.
-    pub configuration: String,
+    pub info: RunInfo,
     pub inputs: Vec<Input>,
 }
 
@@ -31,49 +39,68 @@ pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/streams")
 }
 
-/// Every stream, in the order of their names.
-pub fn all() -> Vec<Stream> {
-    let files = fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = files.filter(|file| file.extension().is_some_and(|it| it == "bin")).collect();
-    files.sort();
-    files.iter().map(|file| Stream::read(file)).collect()
-}
-
 impl Stream {
-    pub fn read(file: &Path) -> Self {
-        let bytes = fs::read(file).unwrap();
-        let mut rest = bytes.as_slice();
-        let columns = [(); WORDS].map(|()| codec::read(&mut rest, CYCLES));
-        assert!(rest.is_empty(), "{}: bytes after its end", file.display());
-        let row = |cycle: usize| -> Row { core::array::from_fn(|word| columns[word][cycle]) };
-        Self {
-            name: file.file_stem().unwrap().to_string_lossy().into_owned(),
-            configuration: fs::read_to_string(file.with_extension("toml")).unwrap(),
-            inputs: (0..CYCLES).map(|cycle| input_words::input(&row(cycle))).collect(),
-        }
+    pub fn new(config: &Config, inputs: Vec<Input>) -> Self {
+        let info = RunInfo {
+            name: config.name.clone(),
+            version: version::NUMBER.into(),
+            instruction_set: instruction_set(config.machine.level),
+            fidelity: parameters(config).fidelity.name().into(),
+            configuration: config.text.clone(),
+            ..RunInfo::default()
+        };
+        Self { info, inputs }
     }
 
-    /// Content of its `.bin`.
-    pub fn bytes(&self) -> Vec<u8> {
-        let rows = self.inputs.iter().scan([0; WORDS], |before, input| {
-            *before = input_words::row(input, before);
-            Some(*before)
+    fn read(file: &Path) -> Self {
+        let mut recording = NamedTempFile::new().unwrap();
+        io::copy(&mut GzDecoder::new(File::open(file).unwrap()), &mut recording).unwrap();
+        let mut inputs = vec![];
+        let summary = Recording::open(recording.path()).unwrap().each(|item| {
+            if let Item::Cycle(cycle) = item {
+                inputs.push(cycle.input().unwrap());
+            }
         });
-        let rows: Vec<Row> = rows.collect();
-        let mut bytes = vec![];
-        for word in 0..WORDS {
-            let column: Vec<u64> = rows.iter().map(|row| row[word]).collect();
-            codec::write(&mut bytes, &column);
+        let Summary { info, unfinished, .. } = summary.unwrap();
+        assert_eq!((inputs.len(), unfinished), (CYCLES, None), "{}", file.display());
+        Self { info, inputs }
+    }
+
+    pub fn write(&self) {
+        let recording = NamedTempFile::new().unwrap();
+        self.record(recording.path(), |_, _, _| Some(Output::default()));
+        let file = folder().join(&self.info.name).with_extension("mcap.gz");
+        let mut packed = GzEncoder::new(File::create(file).unwrap(), Compression::best());
+        io::copy(&mut File::open(recording.path()).unwrap(), &mut packed).unwrap();
+        packed.finish().unwrap();
+    }
+
+    /// Records the inputs with the outputs of a step; without an output the cycle is missing.
+    pub fn record(
+        &self,
+        path: &Path,
+        mut step: impl FnMut(&mut RecordingFile, u64, &Input) -> Option<Output>,
+    ) {
+        let mut file = RecordingFile::create(path, &self.info, None).unwrap();
+        for (cycle, input) in (1..).zip(&self.inputs) {
+            if let Some(output) = step(&mut file, cycle, input) {
+                let message = CycleMessage::new(input, &output);
+                file.write_cycle(&CycleMessage { cycle, due_ns: input.release_ns, ..message }).unwrap();
+            }
         }
-        bytes
+        file.finish().unwrap();
+    }
+
+    /// Its configuration, with lanes on an instruction set.
+    pub fn config(&self, level: Level) -> Config {
+        let config = Config::parse_on(level, &self.info.configuration, &self.info.name);
+        config.unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// What a new controller makes of it whose lanes run on an instruction set.
-    pub fn run(self, level: Level) -> Run {
-        let place = format!("{}.toml", self.name);
-        let config = Config::parse_on(level, &self.configuration, &place);
-        let config = config.unwrap_or_else(|error| panic!("{error}"));
-        let mut controller = Controller::new(&config.machine, parameters(&config));
+    fn run(self, level: Level) -> Run {
+        let config = self.config(level);
+        let mut controller = recorded_controller(&self.info, &config);
         // As in the real-time thread of the daemon denormal numbers count as zero: in a thread of its own, as other tests may
         // follow in this one.
         let step = || {
@@ -92,7 +119,9 @@ pub struct Run {
     pub outputs: Vec<Output>,
 }
 
-/// Every stream, computed with lanes on an instruction set.
+/// Every stream in the order of their names, computed with lanes on an instruction set.
 pub fn run_all(level: Level) -> Vec<Run> {
-    all().into_par_iter().map(|stream| stream.run(level)).collect()
+    let mut files: Vec<_> = fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files.par_iter().map(|file| Stream::read(file).run(level)).collect()
 }

@@ -1,4 +1,4 @@
-//! In place of `src/realtime/futex.rs`: a futex whose sleep ends only by a wake-up.
+//! In place of `src/client/realtime/futex.rs`: a futex whose sleep ends only by a wake-up.
 //!
 //! The lock stands for the kernel's lock of the queue of sleepers: a wake-up comes before the comparison or after
 //! the sleep has begun.

@@ -11,14 +11,14 @@
 //! `cargo test --release --manifest-path tests/loom/Cargo.toml`: `exchange` checks the code as it is; `controls`
 //! weaken it, one flaw at a time, and each flaw must be found.
 
-#[path = "../../src/realtime/clock.rs"]
+#[path = "../../src/client/realtime/clock.rs"]
 pub mod clock;
-#[path = "../../src/realtime/event.rs"]
+#[path = "../../src/client/realtime/event.rs"]
 pub mod event;
 pub mod flaw;
 pub mod futex;
 pub mod messages;
 pub mod models;
 pub mod sync;
-#[path = "../../src/realtime/triple_buffer.rs"]
+#[path = "../../src/client/realtime/triple_buffer.rs"]
 pub mod triple_buffer;

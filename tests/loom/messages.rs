@@ -1,4 +1,4 @@
 //! The clock, where `clock.rs` of the loop finds it.
 
-#[path = "../../src/messages/clock.rs"]
+#[path = "../../src/client/messages/clock.rs"]
 pub mod clock;

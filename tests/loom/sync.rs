@@ -1,4 +1,4 @@
-//! In place of `src/realtime/sync.rs`: what loom observes, and what a [`Flaw`] may weaken.
+//! In place of `src/client/realtime/sync.rs`: what loom observes, and what a [`Flaw`] may weaken.
 
 pub use loom::sync::atomic::{AtomicBool, Ordering};
 pub use std::sync::Arc;

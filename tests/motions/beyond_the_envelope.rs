@@ -1,11 +1,10 @@
 //! A setpoint that leaves the envelope, at every velocity and within the limits: the platform must stop inside.
 
-use super::common::deployed;
-use super::common::observed::Observed;
-use super::common::rig::parameters;
 use super::heave::{Heave, duration_s};
 use super::report::{Report, Runs};
 use hexad::control::parameters::Envelope;
+use hexad_support::deployed;
+use hexad_support::rig::{Rig, parameters};
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 /// The envelope's highest point over home \[m\].
@@ -40,7 +39,7 @@ fn a_setpoint_that_leaves_the_envelope_does_not_take_the_platform_with_it() {
         for slower in SLOWER {
             let duration_s = slower * quickest_s;
             let start = heave.moving(way, duration_s, 0.0);
-            let mut observed = Observed::standing(&config, parameters, &start);
+            let mut observed = Rig::standing(&config, parameters, &start);
             observed.rates = runs.rates();
             observed.engage(&start);
             let start_s = observed.time_s();

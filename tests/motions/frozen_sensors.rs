@@ -1,14 +1,13 @@
 //! Sensors that go on repeating one reading with new time stamps: feedback pushes on until a fault, and must not push
 //! harder than it may.
 
-use super::common::deployed;
-use super::common::extremes::{MOTION_ALLOWANCE, Quantity};
-use super::common::observed::Observed;
-use super::common::rig::parameters;
 use super::heave::{FADE_S, Heave, amplitude};
 use super::report::{Report, Runs};
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::Measurement;
+use hexad_support::deployed;
+use hexad_support::extremes::{MOTION_ALLOWANCE, Quantity};
+use hexad_support::rig::{Rig, parameters};
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 /// Angular frequencies of the vertical sines \[rad/s\].
@@ -51,7 +50,7 @@ fn frozen_sensors_lead_to_no_acceleration_beyond_the_limits_and_to_a_fault() {
             let quarter_s = 0.25 * core::f64::consts::TAU / omega;
             let turns = (FADE_S / (4.0 * quarter_s)).ceil();
             let frozen_s = (4.0 * turns + phase) * quarter_s;
-            let mut observed = Observed::standing(&config, parameters, &sine(0.0));
+            let mut observed = Rig::standing(&config, parameters, &sine(0.0));
             observed.rates = runs.rates();
             observed.engage(&sine(0.0));
             let start_s = observed.time_s();

@@ -1,10 +1,9 @@
 //! A setpoint source that dies while it accelerates: what it had sent is carried on for a while.
 
-use super::common::edited::{config, deployed_table, set};
-use super::common::observed::Observed;
-use super::common::rig::parameters;
 use super::heave::{Heave, SHARE};
 use super::report::{Report, Runs};
+use hexad_support::edited::{config, deployed_table, set};
+use hexad_support::rig::{Rig, parameters};
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 /// A limit that the present acceleration reaches soon after the last setpoint.
@@ -40,7 +39,7 @@ fn a_source_that_dies_while_accelerating_leads_to_no_motion_beyond_the_limits() 
         };
         let mut runs = Runs::default();
         for share in DIES_AT {
-            let mut observed = Observed::standing(&config, parameters, &accelerating(0.0));
+            let mut observed = Rig::standing(&config, parameters, &accelerating(0.0));
             observed.rates = runs.rates();
             observed.engage(&accelerating(0.0));
             let (start_s, mut dead_s) = (observed.time_s(), 0.0);

@@ -5,12 +5,11 @@ use hexad::config::Config;
 use hexad::control::signals::inputs::Input;
 use hexad::control::signals::state::{Request, State};
 
-use super::common::edited::{config, deployed_table, set};
-use super::common::extremes::Quantity;
-use super::common::observed::Observed;
-use super::common::rig::parameters;
 use super::heave::{Heave, duration_s};
 use super::report::{Report, Runs};
+use hexad_support::edited::{config, deployed_table, set};
+use hexad_support::extremes::Quantity;
+use hexad_support::rig::{Rig, parameters};
 
 const MACHINES: [&str; 4] = ["reference", "motion_base", "fried2008", "tsai2000"];
 const RATES_HZ: [f64; 2] = [100.0, 1000.0];
@@ -38,7 +37,7 @@ fn configured(name: &str, rate_hz: f64) -> Config {
 
 /// One run; whether control began while the platform moved.
 fn release_and_park(
-    begun: &Observed,
+    begun: &Rig,
     heave: impl Fn(f64) -> Input,
     off_s: f64,
     late: [usize; 2],
@@ -56,7 +55,7 @@ fn release_and_park(
         cycle += 1;
         let newest = measured.len().saturating_sub(1 + age);
         let measurement = measured[newest - newest % interval];
-        let before = observed.simulator.state().twist.linear.norm();
+        let before = observed.simulator().state().twist.linear.norm();
         let input = Input {
             release_ns: observed.release_ns(),
             measurement: Some(measurement),
@@ -87,7 +86,7 @@ fn control_begins_with_the_motion_that_the_platform_has() {
         let distance = LONGEST_HEAVE_M.min(heave.range[1] - heave.range[0]);
         let ends = [heave.middle() - 0.5 * distance, heave.middle() + 0.5 * distance];
         let duration_s = duration_s(&parameters, &config.machine, distance);
-        let mut begun = Observed::standing(&config, parameters, &heave.moving(ends, duration_s, 0.0));
+        let mut begun = Rig::standing(&config, parameters, &heave.moving(ends, duration_s, 0.0));
         begun.engage(&heave.moving(ends, duration_s, 0.0));
         let start_s = begun.time_s();
         let (mut runs, mut moving) = (Runs::default(), 0);

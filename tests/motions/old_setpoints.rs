@@ -1,14 +1,13 @@
 //! Setpoints that arrive late, each stamped with its true instant and within the limits there.
 
-use super::common::deployed;
-use super::common::fast::Fast;
-use super::common::observed::Observed;
-use super::common::rig::parameters;
 use super::heave::{Heave, amplitude};
 use super::report::{Report, Runs};
 use hexad::config::Config;
 use hexad::control::signals::inputs::Setpoint;
 use hexad::model::task::TaskState;
+use hexad_support::deployed;
+use hexad_support::fast::Fast;
+use hexad_support::rig::{Rig, parameters};
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 const AGES_NS: [u64; 3] = [20_000_000, 30_000_000, 45_000_000];
@@ -17,7 +16,7 @@ const SINES_RAD_S: [f64; 4] = [5.0, 10.0, 25.0, 60.0];
 const DURATION_S: f64 = 5.0;
 
 fn follow_late(config: &Config, motion: &dyn Fn(f64) -> TaskState, age_ns: u64, runs: &mut Runs) {
-    let mut observed = Observed::standing(config, parameters(config), &motion(0.0));
+    let mut observed = Rig::standing(config, parameters(config), &motion(0.0));
     observed.rates = runs.rates();
     observed.engage(&motion(0.0));
     let start_s = observed.time_s();

@@ -3,12 +3,11 @@
 
 use hexad::control::signals::state::{Request, State};
 
-use super::common::certificate::cases;
-use super::common::deployed;
-use super::common::observed::{Observed, Rates};
-use super::common::rig::parameters;
 use super::heave::{Heave, duration_s};
 use super::report::{Report, Runs};
+use hexad_support::certificate::cases;
+use hexad_support::deployed;
+use hexad_support::rig::{Rates, Rig, parameters};
 
 const MACHINES: [&str; 4] = ["reference", "motion_base", "fried2008", "tsai2000"];
 /// Longest heave \[m\]; a machine whose legs reach less far heaves as far as they reach.
@@ -29,7 +28,7 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
     let duration_s = duration_s(&parameters, &config.machine, distance);
     let ways = [[low, high], [high, low]].into_iter().flat_map(|way| Rates::ALL.map(|rates| (way, rates)));
     for ([from, to], rates) in ways {
-        let mut begun = Observed::standing(&config, parameters, &heave.moving([from, to], duration_s, 0.0));
+        let mut begun = Rig::standing(&config, parameters, &heave.moving([from, to], duration_s, 0.0));
         begun.rates = rates;
         begun.engage(&heave.moving([from, to], duration_s, 0.0));
         let start_s = begun.time_s();

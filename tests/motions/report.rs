@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::common::extremes::{Extremes, Quantity};
-use super::common::observed::{Observed, Rates};
+use hexad_support::extremes::{Extremes, Quantity};
+use hexad_support::rig::{Rates, Rig};
 
 /// What one test has measured.
 pub struct Report {
@@ -34,8 +34,8 @@ impl Runs {
         Rates::ALL[self.count as usize % Rates::ALL.len()]
     }
 
-    pub fn add(&mut self, observed: &Observed) {
-        let meter = &observed.meter;
+    pub fn add(&mut self, observed: &Rig) {
+        let meter = &observed.meter();
         self.count += 1;
         self.end_stops += u32::from(meter.impact_m_s.is_some());
         self.impact_m_s = self.impact_m_s.max(meter.impact_m_s.unwrap_or_default());
@@ -76,7 +76,7 @@ impl Report {
                 self.violations.push(format!(
                     "{machine}: {} {value:.4} beyond {allowed:.4} at {:.4} s",
                     quantity.name(),
-                    (at - super::common::observed::START_NS) as f64 * 1e-9
+                    (at - hexad_support::rig::START_NS) as f64 * 1e-9
                 ));
             }
         }

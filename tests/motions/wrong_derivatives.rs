@@ -1,12 +1,11 @@
 //! Setpoints whose derivatives are not those of their poses, at low and high rates.
 
-use super::common::certificate::cases;
-use super::common::edited::{config, deployed_table, set};
-use super::common::observed::Observed;
-use super::common::rig::parameters;
 use super::heave::Heave;
 use super::report::{Report, Runs};
 use hexad::model::task::TaskState;
+use hexad_support::certificate::cases;
+use hexad_support::edited::{config, deployed_table, set};
+use hexad_support::rig::{Rig, parameters};
 
 const MACHINES: [&str; 2] = ["reference", "motion_base"];
 const RATES_HZ: [f64; 4] = [250.0, 1000.0, 10_000.0, 20_000.0];
@@ -38,7 +37,7 @@ fn certificate_wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
                 let task = heave.sine(heave.middle(), amplitude, omega, t);
                 TaskState { x: task.x, xd: task.xd * sent_rate, xdd: task.xdd * sent_accel }
             };
-            let mut observed = Observed::standing(&config, parameters, &sine(0.0));
+            let mut observed = Rig::standing(&config, parameters, &sine(0.0));
             observed.rates = runs.rates();
             observed.engage(&sine(0.0));
             let start_s = observed.time_s();

@@ -22,14 +22,14 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use toml::Table;
 
-use super::common::certificate::Certificate;
-use super::common::edited::{deployed_table, set, table};
-use super::common::identified::{drawn, loaded};
-use super::common::process::Process;
-use super::common::python::output;
-use super::common::{Errors, largest};
 use super::stage::{Run, Stage, turn};
 use super::{file, python};
+use hexad_support::certificate::Certificate;
+use hexad_support::edited::{deployed_table, set, table};
+use hexad_support::identified::{drawn, loaded};
+use hexad_support::process::Process;
+use hexad_support::python::output;
+use hexad_support::{Errors, largest};
 
 const MACHINE: &str = "motion_base";
 /// Known weight as a share of the platform, and its place \[m\].

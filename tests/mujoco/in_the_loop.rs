@@ -4,16 +4,15 @@
 use std::panic::{catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
-use hexad::commands::plant::hardware;
 use hexad::messages::{Bus, Publisher, Subscriber};
 use hexad::messages::{ForceMessage, MeasuredMessage};
 use hexad::model::task::task_coordinates;
 use hexad::motion::built_in::BuiltInMotion;
 
-use super::common::process::{HANG, Process};
-use super::common::stalls::Watchdog;
 use super::stage::{LOCKSTEP, PERIOD_NS, PERIOD_S, Period, Run, Stage, turn};
 use super::{DEPLOYED, python};
+use hexad_support::process::{HANG, Process};
+use hexad_support::stalls::Watchdog;
 
 /// Of the motion \[s\].
 const SECONDS: f64 = 4.0;
@@ -50,7 +49,7 @@ fn with_ours(stage: &Stage) -> Run {
     let mut measured = bus.publisher::<MeasuredMessage>().unwrap();
     let mut forces = bus.subscriber::<ForceMessage>(8).unwrap();
     let source = source(stage);
-    let mut hardware = hardware(&stage.config);
+    let mut hardware = stage.config.deployment.plant.hardware(&stage.config.machine);
     let mut periods = vec![];
     for time_ns in (0..).step_by(PERIOD_NS as usize) {
         let (length_m, length_rate_m_s) = hardware.measure();

@@ -4,10 +4,10 @@
 use std::mem::{align_of, offset_of, size_of};
 use std::process::Command;
 
-use crate::common::libhexad::declared;
 use crate::{file, python};
 use hexad::messages::layout::{Declared, Kind, Layout};
 use hexad::messages::{ForceMessage, Header, MESSAGES, StatusMessage};
+use hexad_support::libhexad::declared;
 
 /// A line for each struct and one for each of its fields.
 fn lines(layout: &Layout, seen: &mut Vec<&'static str>) -> String {

@@ -5,9 +5,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::common::libhexad::with_library;
-use super::common::not_run::lacking;
-use super::common::python::{self, output};
+use hexad_support::libhexad::with_library;
+use hexad_support::not_run::lacking;
+use hexad_support::python::{self, output};
 
 /// The engine. Pinned: what it makes of a model may change.
 const MUJOCO: &str = "mujoco==4.0.0";

@@ -18,11 +18,11 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
-use super::common::certificate::Certificate;
-use super::common::process::{HANG, Process};
-use super::common::python::output;
 use super::{file, python};
-use crate::common::{Errors, Table, largest};
+use hexad_support::certificate::Certificate;
+use hexad_support::process::{HANG, Process};
+use hexad_support::python::output;
+use hexad_support::{Errors, Table, largest};
 
 pub const PERIOD_NS: u64 = 1_000_000;
 pub const PERIOD_S: f64 = 1e-3;

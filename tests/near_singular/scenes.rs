@@ -1,16 +1,6 @@
 //! Poses on their way to a singular one.
 
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::inverse_jacobian::{condition, leg_wrenches};
-use hexad::model::machine::Machine;
-use hexad::model::random::Random;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
-use hexad::model::task::TaskState;
-use hexad::plant::forward_dynamics::ForwardDynamics;
-use nalgebra::{Vector3, Vector6};
-
-use super::common::{Legs, MACHINES, machine};
-use super::determinants;
+use super::*;
 
 /// A motion through a pose.
 pub struct Scene {
@@ -22,26 +12,9 @@ pub struct Scene {
     pub condition: f64,
 }
 
-/// Vectors that are the same in every run.
-pub struct Numbers(Random);
-
-impl Numbers {
-    pub fn new(seed: u64) -> Self {
-        Self(Random::new(seed))
-    }
-
-    /// Evenly in -1..1.
-    pub fn unit(&mut self) -> f64 {
-        self.0.signed()
-    }
-
-    pub fn vector(&mut self) -> Vector3<f64> {
-        Vector3::new(self.unit(), self.unit(), self.unit())
-    }
-
-    pub fn vector6(&mut self) -> Vector6<f64> {
-        Vector6::from_fn(|_, _| self.unit())
-    }
+/// A direction that is nowhere that of a leg.
+fn axis(random: &mut Random) -> Vector3<f64> {
+    (vector(random) + Vector3::new(0.1, 0.2, 0.3)).normalize()
 }
 
 /// A straight way of the platform: rotation vector and displacement per unit of s.
@@ -80,46 +53,39 @@ impl Way {
     }
 }
 
-fn home(machine: &Machine) -> Pose {
-    TaskState::at_rest(machine.home).motion().pose
-}
-
 /// Random joints on the machine's masses, laid out for a pose that is not the one to come.
-fn random_layout(numbers: &mut Numbers) -> Machine {
+fn random_layout(random: &mut Random) -> Machine {
     let mut machine = machine("scattered");
     let legs = Legs {
-        base: core::array::from_fn(|_| numbers.vector()),
-        platform: core::array::from_fn(|_| numbers.vector() * 0.6),
-        universal_axis: core::array::from_fn(|_| {
-            (numbers.vector() + Vector3::new(0.1, 0.2, 0.3)).normalize()
-        }),
+        base: core::array::from_fn(|_| vector(random)),
+        platform: core::array::from_fn(|_| vector(random) * 0.6),
+        universal_axis: core::array::from_fn(|_| axis(random)),
     };
-    machine.home = [0.0, 0.0, 0.0, 0.2 * numbers.unit(), 0.2 * numbers.unit(), 1.0 + 0.5 * numbers.unit()];
+    machine.home = [0.0, 0.0, 0.0, 0.2 * random.signed(), 0.2 * random.signed(), 1.0 + 0.5 * random.signed()];
     machine.joints = legs.joints(&machine.home);
     machine
 }
 
 /// At home three legs point to one point P, and three lie in a plane through P: two motions are free, so two singular values
 /// become small together, while the directions of the legs stay independent.
-fn two_free_motions(numbers: &mut Numbers) -> Machine {
+fn two_free_motions(random: &mut Random) -> Machine {
     let mut machine = machine("scattered");
     let center = Vector3::new(0.0, 0.0, 1.0);
-    let [point, normal] = [numbers.vector() + center * 2.0, numbers.vector().normalize()];
+    let [point, normal] = [vector(random) + center * 2.0, vector(random).normalize()];
     let in_plane = |v: Vector3<f64>| v - normal * normal.dot(&(v - point));
     let base: [_; 6] = core::array::from_fn(|k| {
-        let joint = numbers.vector();
+        let joint = vector(random);
         if k < 3 { joint } else { in_plane(joint) }
     });
     let platform = core::array::from_fn(|k| {
         let joint = if k < 3 {
-            base[k].lerp(&point, 0.5 + 0.2 * numbers.unit())
+            base[k].lerp(&point, 0.5 + 0.2 * random.signed())
         } else {
-            in_plane(center + numbers.vector() * 0.6)
+            in_plane(center + vector(random) * 0.6)
         };
         joint - center
     });
-    let universal_axis =
-        core::array::from_fn(|_| (numbers.vector() + Vector3::new(0.1, 0.2, 0.3)).normalize());
+    let universal_axis = core::array::from_fn(|_| axis(random));
     machine.home = [0.0, 0.0, 0.0, center.x, center.y, center.z];
     machine.joints = Legs { base, platform, universal_axis }.joints(&machine.home);
     machine
@@ -131,26 +97,26 @@ fn approach(
     machine: &Machine,
     way: &Way,
     s: f64,
-    numbers: &mut Numbers,
+    random: &mut Random,
     visit: &mut dyn FnMut(&Scene),
 ) {
     let model = InverseDynamics::new(machine);
     let dynamics = ForwardDynamics::new(machine);
     for power in 0..28 {
         for _ in 0..2 {
-            let distance = 10f64.powf(-0.5 * f64::from(power) + 0.25 * numbers.unit());
+            let distance = 10f64.powf(-0.5 * f64::from(power) + 0.25 * random.signed());
             let pose = way.at(s - distance);
             let condition = condition(machine, &pose);
             if !(condition < 1e13) {
                 continue;
             }
             let r = machine.joints.radius;
-            let twist = Twist { angular: numbers.vector(), linear: numbers.vector() * r };
+            let twist = Twist { angular: vector(random), linear: vector(random) * r };
             // A load without regard to the pose, and one that moderate forces balance.
-            let any = Acceleration { angular: numbers.vector() * 10.0, linear: numbers.vector() * 10.0 * r };
-            let force = numbers.vector6() * (10.0 * machine.platform.mass);
+            let any = Acceleration { angular: vector(random) * 10.0, linear: vector(random) * 10.0 * r };
+            let force = Vector6::from_fn(|_, _| random.signed()) * (10.0 * machine.platform.mass);
             let smooth = dynamics.acceleration(&pose, &twist, &force.into());
-            let rates = numbers.vector6();
+            let rates = Vector6::from_fn(|_, _| random.signed());
             let moderate = leg_wrenches(machine, &pose).transpose() * twist.vector();
             let motion = |acceleration| Motion { pose, twist, acceleration };
             let mut visit =
@@ -163,14 +129,29 @@ fn approach(
     }
 }
 
+/// Motions near the first pose of a way where a determinant vanishes: that of all directions, or of those of three legs.
+fn approach_crossings(
+    family: &'static str,
+    machine: &Machine,
+    way: &Way,
+    random: &mut Random,
+    visit: &mut dyn FnMut(&Scene),
+) {
+    if let Some(s) = way.crossing(|pose| leg_wrenches(machine, pose).determinant()) {
+        approach(family, machine, way, s, random, visit);
+    }
+    if let Some(s) = way.crossing(|pose| determinants(machine, pose).0) {
+        approach("coplanar A", machine, way, s, random, visit);
+    }
+}
+
 /// All of them.
 pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
-    let mut numbers = Numbers::new(2008);
-    let det = |machine: &Machine, pose: &Pose| leg_wrenches(machine, pose).determinant();
+    let random = &mut Random::new(2008);
     for name in MACHINES {
         let machine = machine(name);
         let r = machine.joints.radius;
-        let start = home(&machine);
+        let start = machine.home_pose();
         let up = start.rotation.column(2).into_owned();
         // Turns about the vertical, about axes across it, screws.
         let mut ways = vec![(up, Vector3::zeros()), (-up, Vector3::zeros())];
@@ -178,24 +159,12 @@ pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
             [Vector3::x(), Vector3::y(), -Vector3::x(), -Vector3::y()]
                 .map(|axis| (start.rotation * axis, Vector3::zeros())),
         );
-        for _ in 0..30 {
-            ways.push((numbers.vector().normalize(), numbers.vector() * r * 0.3));
-        }
+        ways.extend((0..30).map(|_| (vector(random).normalize(), vector(random) * r * 0.3)));
         for (k, (axis, shift)) in ways.into_iter().enumerate() {
             let way = Way { start, turn: axis * 2.6, shift };
-            let family = if k < 2 {
-                "vertical turn"
-            } else if k < 6 {
-                "roll or pitch"
-            } else {
-                "screw"
-            };
-            if let Some(s) = way.crossing(|pose| det(&machine, pose)) {
-                approach(family, &machine, &way, s, &mut numbers, visit);
-            }
-            if let Some(s) = way.crossing(|pose| determinants(&machine, pose).0) {
-                approach("coplanar A", &machine, &way, s, &mut numbers, visit);
-            }
+            let family =
+                ["vertical turn", "roll or pitch", "screw"][usize::from(k >= 2) + usize::from(k >= 6)];
+            approach_crossings(family, &machine, &way, random, visit);
         }
         // The platform sinks into the plane of its base (for flat ones a rank of three).
         let legs = Legs::of(&machine);
@@ -204,21 +173,16 @@ pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
             - start.rotation * (legs.platform.iter().sum::<Vector3<f64>>() / 6.0);
         let depth = start.rotation.column(2).dot(&sink);
         let way = Way { start, turn: Vector3::zeros(), shift: start.rotation.column(2) * depth };
-        approach("coplanar legs", &machine, &way, 1.0, &mut numbers, visit);
+        approach("coplanar legs", &machine, &way, 1.0, random, visit);
     }
     for _ in 0..100 {
-        let machine = two_free_motions(&mut numbers);
-        let way = Way { start: home(&machine), turn: numbers.vector(), shift: numbers.vector() * 0.3 };
-        approach("two free motions", &machine, &way, 0.0, &mut numbers, visit);
+        let machine = two_free_motions(random);
+        let way = Way { start: machine.home_pose(), turn: vector(random), shift: vector(random) * 0.3 };
+        approach("two free motions", &machine, &way, 0.0, random, visit);
     }
     for _ in 0..150 {
-        let machine = random_layout(&mut numbers);
-        let way = Way { start: home(&machine), turn: numbers.vector() * 3.0, shift: numbers.vector() * 0.3 };
-        if let Some(s) = way.crossing(|pose| det(&machine, pose)) {
-            approach("random layout", &machine, &way, s, &mut numbers, visit);
-        }
-        if let Some(s) = way.crossing(|pose| determinants(&machine, pose).0) {
-            approach("coplanar A", &machine, &way, s, &mut numbers, visit);
-        }
+        let machine = random_layout(random);
+        let way = Way { start: machine.home_pose(), turn: vector(random) * 3.0, shift: vector(random) * 0.3 };
+        approach_crossings("random layout", &machine, &way, random, visit);
     }
 }

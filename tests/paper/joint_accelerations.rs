@@ -14,10 +14,10 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::common::paper::form::EXACT;
-use super::common::paper::kinematics::{Leg, State, joint, legs, platform, tilde_x};
-use super::common::{Errors, MACHINES};
 use super::vectors::{Case, ROUNDING, load};
+use hexad_support::paper::form::EXACT;
+use hexad_support::paper::kinematics::{Leg, State, joint, legs, platform, tilde_x};
+use hexad_support::{Errors, MACHINES};
 
 /// Relative error of differences over [`STEP_S`]; measured 1.3e-5.
 const DIFFERENCES: f64 = 5e-5;

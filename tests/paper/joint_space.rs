@@ -2,15 +2,9 @@
 //! of the platform.
 
 use hexad::model::joint_space::joint_space;
-use hexad::model::task::TaskState;
-use nalgebra::{Matrix3, Vector6};
 
-use super::common::paper::dense::Dense;
-use super::common::paper::force::{at_c, platform_wrench};
-use super::common::paper::form::EXACT;
-use super::common::paper::kinematics::{joint, legs, platform};
-use super::common::{Errors, MACHINES, machine};
 use super::vectors::{ROUNDING, load};
+use super::*;
 
 #[test]
 fn legs_in_joint_coordinates_are_those_of_the_dense_matrices() {

@@ -1,12 +1,6 @@
 //! The machines with their vectors, and how far a reading of the equations is from them.
 
-use nalgebra::Vector6;
-
-use super::common::paper::force::forces;
-use super::common::paper::form::Form;
-use super::common::paper::kinematics::State;
-use super::common::paper::machine::Machine;
-use super::common::{Errors, Table, data};
+use super::*;
 
 /// Bound on an error that is rounding only, as a share of the largest force of its row: fifty times what is
 /// measured (2e-15), because sine and cosine differ from one mathematics library to another.

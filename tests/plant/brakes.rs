@@ -1,12 +1,6 @@
 //! Brakes and end stops.
 
-use hexad::model::LEGS;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::Twist;
-use hexad::plant::simulator::{Brakes, Simulator};
-
-use super::common::{largest, machine};
-use super::{DECELERATION, DEFAULT_STEP_S, shaking};
+use super::*;
 
 /// A platform in the middle of a motion.
 fn in_motion(machine: &Machine) -> Simulator {

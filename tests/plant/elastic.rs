@@ -1,15 +1,7 @@
 //! Elastic legs: energy, play, the rigid limit, and the step that the tolerance asks for.
 
-use hexad::model::LEGS;
-use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::machine::Machine;
-use hexad::plant::imperfections::{ElasticLeg, Friction, Imperfections};
-use hexad::plant::simulator::{Brakes, Simulator};
-use nalgebra::Vector6;
-
-use super::common::{Legs, largest, machine};
 use super::energy::energy;
-use super::{DECELERATION, DEFAULT_STEP_S, TOLERANCE_M, shaking, simulator, without_drives};
+use super::*;
 
 const SPRING: ElasticLeg = ElasticLeg { stiffness: 2e7, damping: 0.0, backlash: 0.0 };
 
@@ -56,7 +48,6 @@ fn springs_keep_energy() {
             swing =
                 swing.max((drives - Vector6::from(leg_lengths(&machine, &simulator.state().pose))).amax());
         }
-        println!("play {backlash}: {start} J, error {worst:.1e}, swing {swing:.1e} m");
         // Contact that comes and goes within a step costs order.
         assert!(worst < if backlash == 0.0 { 1e-6 } else { 1e-3 }, "{worst}");
         assert!(swing > 2e-5, "it rings: {swing}");
@@ -88,7 +79,7 @@ fn a_loaded_leg_is_deflected_and_at_rest() {
         let spring = ElasticLeg { backlash, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         let legs = leg_lengths(&machine, &simulator.state().pose);
-        let hold = super::holding(&machine, &simulator.state().pose);
+        let hold = holding(&machine, &simulator.state().pose);
         for i in 0..LEGS {
             let deflection = simulator.leg_motion().length[i] - legs[i];
             let expected = hold[i] / spring.stiffness + 0.5 * backlash * hold[i].signum();
@@ -133,7 +124,7 @@ fn a_stiff_leg_is_nearly_rigid() {
         let mut simulator = simulator(&machine, &wanted);
         for k in 0..400 {
             // Open loop: all get the same forces.
-            let state = super::home(&machine);
+            let state = home(&machine);
             let ramp = (f64::from(k) / 200.0).min(1.0);
             let force = shaking(&machine, &state, 1e-3 * f64::from(k), 0.02 * ramp, 1.0);
             simulator.advance(1e-3, Some(&force));
@@ -145,8 +136,7 @@ fn a_stiff_leg_is_nearly_rigid() {
         let spring = ElasticLeg { stiffness, damping: 1e5, ..SPRING };
         run(Some(spring)).displacement_to(&rigid).linear.norm()
     });
-    let way = super::home(&machine).pose.displacement_to(&rigid).linear.norm();
-    println!("{softer:.1e} m, {stiffer:.1e} m of {way:.1e} m");
+    let way = home(&machine).pose.displacement_to(&rigid).linear.norm();
     assert!((2.5..6.0).contains(&(softer / stiffer)) && softer < 2e-3 * way, "{softer} {stiffer} {way}");
 }
 
@@ -172,7 +162,7 @@ fn the_step_keeps_the_tolerance() {
     ] {
         let run = |longest: f64, tolerance: f64| {
             let mut simulator = Simulator::imperfect(&machine, DECELERATION, longest, tolerance, &wanted);
-            let hold = super::holding(&machine, &super::home(&machine).pose);
+            let hold = holding(&machine, &home(&machine).pose);
             let cycle = |k| {
                 let sign = if k / 10 % 2 == 0 { 1.0 } else { -1.0 };
                 simulator.advance(1e-3, Some(&hold.map(|force| force + 1000.0 * sign)));
@@ -188,8 +178,6 @@ fn the_step_keeps_the_tolerance() {
         let (_, exact) = run(step / 8.0, TOLERANCE_M);
         let (loose_step, loose) = run(1e-3, 1e-5);
         let [error, loose] = [&chosen, &loose].map(|lengths| apart(lengths, &exact));
-        let us = |step: f64| (1e6 * step).round();
-        println!("{what}: step {} us, error {error:.1e} m; {} us, {loose:.1e} m", us(step), us(loose_step));
         assert!(step < 1e-3 && error < TOLERANCE_M, "{what}: {error}");
         assert!(loose_step > step && loose > 2.0 * error, "{what}: {loose}");
         beyond += usize::from(loose > TOLERANCE_M);
@@ -212,7 +200,7 @@ fn what_cannot_be_seen_is_left_out() {
     assert_eq!(terms(3e9, 0.0, 1e5), (true, false, true));
     assert_eq!(terms(1e12, 0.0, 1000.0), (false, true, true));
     // A drive without mass has no motion of its own.
-    let massless = super::common::machine("fried2008");
+    let massless = hexad_support::machine("fried2008");
     assert_eq!(massless.actuator.reflected_mass, 0.0);
     let simulator = simulator(&massless, &elastic(SPRING));
     assert!(simulator.terms().elastic.is_none());

@@ -1,10 +1,6 @@
 //! Energy of the machine, body by body: positions, velocities and angular velocities, nothing else.
 
-use hexad::model::machine::{Link, Machine};
-use hexad::plant::integrator::BodyState;
-use nalgebra::Vector3;
-
-use super::common::Legs;
+use super::*;
 
 /// Energies \[J\].
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,6 +40,27 @@ pub fn energy(machine: &Machine, state: &BodyState) -> Energy {
     sum
 }
 
+/// Kinetic energy at the start \[J\], what is gained in so many pairs of steps, and the integral of a power of the rates, by
+/// Simpson's rule.
+pub fn worked(
+    machine: &Machine,
+    simulator: &mut Simulator,
+    pairs: u32,
+    force: &[f64; 6],
+    power: impl Fn([f64; 6]) -> f64,
+) -> (f64, f64, f64) {
+    let start = energy(machine, simulator.state()).kinetic;
+    let mut work = 0.0;
+    for _ in 0..pairs {
+        for weight in [1.0, 4.0] {
+            work += weight * power(simulator.leg_motion().rate) * DEFAULT_STEP_S / 3.0;
+            simulator.advance(DEFAULT_STEP_S, Some(force));
+        }
+        work += power(simulator.leg_motion().rate) * DEFAULT_STEP_S / 3.0;
+    }
+    (start, energy(machine, simulator.state()).kinetic - start, work)
+}
+
 /// Where a leg's ends are and how they move.
 struct Leg {
     a: Vector3<f64>,
@@ -71,16 +88,8 @@ impl Leg {
         add_link(machine, cylinder, length, &n, &at, &(n_rate * cylinder.center_of_mass), &angular, sum);
         let rod = &machine.rod;
         let at = self.b - n * rod.center_of_mass;
-        add_link(
-            machine,
-            rod,
-            length,
-            &n,
-            &at,
-            &(self.b_velocity - n_rate * rod.center_of_mass),
-            &angular,
-            sum,
-        );
+        let velocity = self.b_velocity - n_rate * rod.center_of_mass;
+        add_link(machine, rod, length, &n, &at, &velocity, &angular, sum);
         sum.kinetic += 0.5 * machine.actuator.reflected_mass * rate * rate;
     }
 }

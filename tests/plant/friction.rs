@@ -1,12 +1,7 @@
 //! Dry friction: stable at the default step, and it only ever takes energy.
 
-use hexad::model::machine::Machine;
-use hexad::plant::integrator::BodyState;
-use hexad::plant::simulator::{Brakes, Simulator};
-
-use super::common::machine;
-use super::energy::energy;
-use super::{DECELERATION, DEFAULT_STEP_S, shaking};
+use super::energy::{energy, worked};
+use super::*;
 
 /// A machine in space, pushed along at first, then left to its friction: kinetic energy after every step.
 fn coasting(machine: &Machine, seconds: f64) -> Vec<f64> {
@@ -38,11 +33,7 @@ fn dry_friction_takes_energy_and_nothing_chatters() {
         machine.rod.transverse_inertia.quadratic = 0.0;
         let energies = coasting(&machine, 2.0);
         let (first, last) = (energies[0], energies[energies.len() - 1]);
-        println!("{name}: {first:.1e} J to {last:.1e} J");
-        assert!(
-            energies.iter().zip(&energies[1..]).all(|(a, b)| *b <= a + 1e-15 * first),
-            "{name} gained energy"
-        );
+        assert!(energies.is_sorted_by(|a, b| *b <= a + 1e-15 * first), "{name} gained energy");
         assert!(first > 1e-3 && last < 1e-9 * first, "{name}: {first} to {last}");
     }
 }
@@ -58,7 +49,7 @@ fn dry_friction_holds() {
     let half = 0.5 * machine.actuator.largest_coulomb_friction();
     for _ in 0..1000 {
         simulator.advance(1e-3, Some(&[half, -half, half, half, -half, -half]));
-        let fastest = super::common::largest(&simulator.leg_motion().rate);
+        let fastest = largest(&simulator.leg_motion().rate);
         assert!(fastest < smoothing, "{fastest} of {smoothing}");
     }
     let BodyState { twist, .. } = *simulator.state();
@@ -72,20 +63,10 @@ fn viscous_friction_dissipates_what_it_should() {
     machine.gravity.fill(0.0);
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
     simulator.advance(0.2, Some(&[300.0; 6]));
-    let start = energy(&machine, simulator.state()).kinetic;
-    let (mut dissipated, c) = (0.0, machine.actuator.largest_viscous_friction());
-    let power =
-        |simulator: &Simulator| simulator.leg_motion().rate.iter().map(|rate| c * rate * rate).sum::<f64>();
-    for _ in 0..400 {
-        // Simpson's rule over two steps.
-        let before = power(&simulator);
-        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; 6]));
-        let middle = power(&simulator);
-        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; 6]));
-        dissipated += (before + 4.0 * middle + power(&simulator)) * DEFAULT_STEP_S / 3.0;
-    }
-    let lost = start - energy(&machine, simulator.state()).kinetic;
-    assert!(lost > 0.1 * start && (lost / dissipated - 1.0).abs() < 1e-9, "{lost} {dissipated}");
+    let c = machine.actuator.largest_viscous_friction();
+    let power = |rates: [f64; 6]| -rates.iter().map(|rate| c * rate * rate).sum::<f64>();
+    let (start, gained, put_in) = worked(&machine, &mut simulator, 400, &[0.0; 6], power);
+    assert!(gained < -0.1 * start && (gained / put_in - 1.0).abs() < 1e-9, "{gained} {put_in}");
 }
 
 /// Load friction alone: what the drives put in, less its share, becomes kinetic energy. The commands are not the forces.
@@ -102,9 +83,7 @@ fn load_friction_takes_its_share_of_the_drives_power() {
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
     // Every leg is faster than the smoothing speed from here on.
     simulator.advance(0.05, Some(&COMMAND));
-    let start = energy(&machine, simulator.state()).kinetic;
-    let power = |simulator: &Simulator| {
-        let rates = simulator.leg_motion().rate;
+    let power = |rates: [f64; 6]| {
         assert!(rates.iter().all(|rate| rate.abs() > 1e-3), "{rates:?}");
         (0..6)
             .map(|leg| {
@@ -113,14 +92,6 @@ fn load_friction_takes_its_share_of_the_drives_power() {
             })
             .sum::<f64>()
     };
-    let mut put_in = 0.0;
-    for _ in 0..400 {
-        let before = power(&simulator);
-        simulator.advance(DEFAULT_STEP_S, Some(&COMMAND));
-        let middle = power(&simulator);
-        simulator.advance(DEFAULT_STEP_S, Some(&COMMAND));
-        put_in += (before + 4.0 * middle + power(&simulator)) * DEFAULT_STEP_S / 3.0;
-    }
-    let gained = energy(&machine, simulator.state()).kinetic - start;
+    let (start, gained, put_in) = worked(&machine, &mut simulator, 400, &COMMAND, power);
     assert!(gained > start && (gained / put_in - 1.0).abs() < 1e-9, "{gained} {put_in}");
 }

@@ -1,13 +1,6 @@
 //! Commands and sensors: nothing by default, the same with the same seed, and each imperfection alone.
 
-use hexad::model::LEGS;
-use hexad::model::machine::Machine;
-use hexad::plant::hardware::Hardware;
-use hexad::plant::imperfections::{BuildErrors, Imperfections};
-use hexad::plant::simulator::{Brakes, Simulator};
-
-use super::common::{Errors, Legs, MACHINES, deployed, machine};
-use super::{DECELERATION, DEFAULT_STEP_S, TOLERANCE_M, hardware, shaking};
+use super::*;
 
 /// What the sensors say, cycle after cycle of 0.7 ms, of a machine that is shaken and braked in turns. `forces` sees
 /// what is true.
@@ -84,7 +77,7 @@ fn sensors_have_the_noise_and_the_steps_that_were_asked_for() {
     // 30,000 samples: standard errors of 0.4 % of the deviation, 0.6 % of the mean, 1.4 % of the correlation.
     assert!((length.rms() / 3e-6 - 1.0).abs() < 0.02 && (rate.rms() / 2e-4 - 1.0).abs() < 0.02, "{length:?}");
     // A Gaussian's mean magnitude.
-    assert!((length.mean() / 3e-6 - (2.0 / core::f64::consts::PI).sqrt()).abs() < 0.02, "{length:?}");
+    assert!((length.mean() / 3e-6 - (2.0 / PI).sqrt()).abs() < 0.02, "{length:?}");
     assert!((sum / 30e3).abs() < 0.03 * 3e-6, "{sum}");
     assert!((products / 5e3).abs() < 0.06 * 9e-12, "legs are independent: {products}");
 

@@ -1,16 +1,8 @@
 //! Forces that are held while the legs turn: the bounds of the jerk against the accelerations of the plant.
 
 use hexad::analysis::held_forces::HeldForces;
-use hexad::control::signals::limits::{DerivativeLimits, Limits};
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::random::Random;
-use hexad::model::rigid::{Acceleration, Motion, Twist};
-use hexad::plant::forward_dynamics::ForwardDynamics;
-use nalgebra::Vector6;
 
-use super::common::{MACHINES, machine};
+use super::*;
 
 /// No motion changes the acceleration faster than the bounds, and some do so nearly.
 #[test]

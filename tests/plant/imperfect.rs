@@ -1,19 +1,7 @@
 //! Forces that the model does not have, each against what it must do by the laws of mechanics.
 
-use hexad::model::LEGS;
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::machine::Machine;
-use hexad::model::random::Random;
-use hexad::model::rigid::{Acceleration, Motion, Twist, Wrench};
-use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::imperfections::{BuildErrors, Friction, Imperfections};
-use nalgebra::{Vector3, Vector6};
-
-use super::common::{Errors, MACHINES, largest, machine, motions};
-use super::energy::energy;
-use super::{DEFAULT_STEP_S, hardware, home, simulator, without_drives};
+use super::energy::worked;
+use super::*;
 
 /// A machine in space whose drives only push.
 fn floating(name: &str) -> Machine {
@@ -27,45 +15,33 @@ fn floating(name: &str) -> Machine {
 #[test]
 fn a_payload_needs_the_forces_of_a_point_mass() {
     let build = BuildErrors { payload: 2.5, payload_at: Vector3::new(0.2, -0.1, 0.3), joints: 0.0 };
-    for name in MACHINES {
-        let machine = machine(name);
-        let loaded = build.built(&machine, &mut Random::new(0));
-        let mut errors = Errors::default();
-        for motion in motions(name) {
-            let Motion { pose, twist: Twist { angular, .. }, acceleration } = motion;
-            let arm = pose.rotation * build.payload_at;
-            let accelerates =
-                acceleration.linear + acceleration.angular.cross(&arm) + angular.cross(&angular.cross(&arm));
-            let force = (accelerates - machine.gravity) * build.payload;
-            let torque = arm.cross(&force);
-            let n = leg_wrenches(&machine, &pose);
-            let total = |machine| n * Vector6::from(inverse_dynamics::<Exact>(machine, &motion).unwrap());
-            let added = total(&loaded) - total(&machine);
-            let expected = Wrench { torque, force }.vector();
-            errors.add((added - expected).amax() / total(&loaded).amax());
-        }
-        errors.assert_within(1e-12, &format!("{name} with payload, wrench"));
-    }
+    assert_each_within(1e-12, "with payload, wrench", &MACHINES, |machine, motion| {
+        let Motion { pose, twist: Twist { angular, .. }, acceleration } = motion;
+        let loaded = build.built(machine, &mut Random::new(0));
+        let arm = pose.rotation * build.payload_at;
+        let accelerates =
+            acceleration.linear + acceleration.angular.cross(&arm) + angular.cross(&angular.cross(&arm));
+        let force = (accelerates - machine.gravity) * build.payload;
+        let n = leg_wrenches(machine, pose);
+        let total = |machine| n * Vector6::from(inverse_dynamics::<Exact>(machine, motion).unwrap());
+        let expected = Wrench { torque: arm.cross(&force), force }.vector();
+        (total(&loaded) - total(machine) - expected).amax() / total(&loaded).amax()
+    });
 }
 
 #[test]
 fn an_external_wrench_acts_on_the_platform_at_its_origin() {
-    for name in ["motion_base", "fried2008", "tilted"] {
-        let machine = machine(name);
-        let dynamics = ForwardDynamics::new(&machine);
-        let mut errors = Errors::default();
-        for Motion { pose, twist, .. } in motions(name) {
-            let wrench =
-                Wrench { torque: Vector3::new(3.0, -5.0, 2.0), force: Vector3::new(-20.0, 10.0, 30.0) };
-            let force = [12.0; LEGS];
-            let n = leg_wrenches(&machine, &pose);
-            let as_legs = n.lu().solve(&wrench.vector()).unwrap() + Vector6::from(force);
-            let found = dynamics.acceleration_under(&pose, &twist, &force, &wrench).unwrap().vector();
-            let expected = dynamics.acceleration(&pose, &twist, &as_legs.into()).unwrap().vector();
-            errors.add((found - expected).amax() / expected.amax());
-        }
-        errors.assert_within(1e-11, &format!("{name}, acceleration under a wrench"));
-    }
+    let wrench = Wrench { torque: Vector3::new(3.0, -5.0, 2.0), force: Vector3::new(-20.0, 10.0, 30.0) };
+    let machines = ["motion_base", "fried2008", "tilted"];
+    assert_each_within(1e-11, "acceleration under a wrench", &machines, |machine, motion| {
+        let (dynamics, Motion { pose, twist, .. }) = (ForwardDynamics::new(machine), motion);
+        let force = [12.0; LEGS];
+        let n = leg_wrenches(machine, pose);
+        let as_legs = n.lu().solve(&wrench.vector()).unwrap() + Vector6::from(force);
+        let found = dynamics.acceleration_under(pose, twist, &force, &wrench).unwrap().vector();
+        let expected = dynamics.acceleration(pose, twist, &as_legs.into()).unwrap().vector();
+        (found - expected).amax() / expected.amax()
+    });
 }
 
 /// A platform in space that a cosine pushes along z: its velocity is a sine.
@@ -80,7 +56,7 @@ fn an_external_wrench_swings() {
     // Brakes hold it, while its time goes on.
     simulator.advance(0.1, None);
     assert_eq!(simulator.state().pose, start);
-    let w = core::f64::consts::TAU * 10.0;
+    let w = TAU * 10.0;
     let dynamics = ForwardDynamics::new(&machine);
     let accelerates = dynamics
         .acceleration_under(&start, &Twist::default(), &[0.0; LEGS], &wanted.external.wrench)
@@ -140,18 +116,10 @@ fn friction_dissipates_what_it_should() {
     let friction = Friction { viscous: 300.0, coulomb: 100.0, stiction: 150.0, stribeck_speed: 0.02 };
     let mut simulator = simulator(&machine, &Imperfections { friction, ..Imperfections::default() });
     simulator.advance(0.1, Some(&[2000.0; LEGS]));
-    let start = energy(&machine, simulator.state()).kinetic;
-    let power = |rates: [f64; LEGS]| rates.iter().map(|rate| rate * friction.force(*rate, 1e-9)).sum::<f64>();
-    let mut dissipated = 0.0;
-    for _ in 0..100 {
-        let before = power(simulator.leg_motion().rate);
-        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; LEGS]));
-        let middle = power(simulator.leg_motion().rate);
-        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; LEGS]));
-        dissipated += (before + 4.0 * middle + power(simulator.leg_motion().rate)) * DEFAULT_STEP_S / 3.0;
-    }
-    let lost = start - energy(&machine, simulator.state()).kinetic;
-    assert!(lost > 0.1 * start && (lost / dissipated - 1.0).abs() < 1e-6, "{lost} {dissipated}");
+    let power =
+        |rates: [f64; LEGS]| -rates.iter().map(|rate| rate * friction.force(*rate, 1e-9)).sum::<f64>();
+    let (start, gained, put_in) = worked(&machine, &mut simulator, 100, &[0.0; LEGS], power);
+    assert!(gained < -0.1 * start && (gained / put_in - 1.0).abs() < 1e-6, "{gained} {put_in}");
 }
 
 /// With the lag w, the way under a constant push is that of a push that came 1 / w later.
@@ -162,7 +130,7 @@ fn a_lag_delays_the_force() {
     wanted.drive.bandwidth_hz = Some(50.0);
     let mut simulator = simulator(&machine, &wanted);
     assert!(simulator.terms().lag.is_some());
-    let w = core::f64::consts::TAU * 50.0;
+    let w = TAU * 50.0;
     let push = [300.0; LEGS];
     let start = home(&machine);
     let accelerates = ForwardDynamics::new(&machine).acceleration(&start.pose, &start.twist, &push).unwrap();
@@ -187,7 +155,7 @@ fn a_lag_delays_the_force() {
 #[test]
 fn everything_at_once_still_stops() {
     let machine = machine("motion_base");
-    let wanted = super::everything();
+    let wanted = everything();
     let mut hardware = hardware(&machine, &wanted);
     let motion = Motion {
         pose: home(&machine).pose,

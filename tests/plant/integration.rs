@@ -1,11 +1,6 @@
 //! The integrator: order four, and an error at the default step that nobody will ever measure.
 
-use hexad::model::machine::Machine;
-use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::integrator::BodyState;
-
-use super::common::{Errors, angle_between, machine};
-use super::{DEFAULT_STEP_S, home, integrate, shaking};
+use super::*;
 
 /// The states after each `hold` of a motion whose forces are constant that long, with steps of `hold / steps`.
 fn motion(machine: &Machine, hold: f64, steps: u32, duration: f64) -> Vec<BodyState> {
@@ -38,7 +33,6 @@ fn halving_the_step_divides_the_error_by_sixteen() {
         let ends = [1, 2, 4, 8, 64].map(|steps| *motion(&machine, 0.016, steps, 0.8).last().unwrap());
         let errors: Vec<_> = ends[..4].iter().map(|end| distance(end, &ends[4])).collect();
         let ratios: Vec<_> = errors.iter().zip(&errors[1..]).map(|(a, b)| a / b).collect();
-        println!("{name}: errors {errors:?}, ratios {ratios:.1?}");
         assert!(errors[3] > 1e-12, "{name}: above rounding");
         assert!(ratios.iter().all(|ratio| (11.0..23.0).contains(ratio)), "{name}: {ratios:?}");
     }

@@ -6,102 +6,75 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
-use crate::common::certificate::Certificate;
-use crate::common::not_run::lacking;
-use crate::support::children::{Ended, HANG, Hexad, run};
+use crate::support::children::{Ended, Hexad};
 use crate::support::disturbance::{line_of, python};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::nobody::{AS_NOBODY, cannot, wrapped};
-use crate::support::operator::does;
+use crate::support::operator::{does, own_name};
 use crate::support::peer::Controlled;
-use crate::support::socket::{Client, path_of, status};
+use crate::support::socket::{Client, path_of, state, status};
 use crate::support::trio::{Trio, start_daemon};
-use crate::support::turns;
-
-fn request(name: &str, more: Value) -> String {
-    let mut line = json!({"version": 1, "request": name});
-    for (key, value) in more.as_object().expect("keys") {
-        line[key] = value.clone();
-    }
-    format!("{line}\n")
-}
+use hexad_support::certificate::Certificate;
+use hexad_support::not_run::lacking;
 
 #[test]
-#[expect(clippy::too_many_lines, reason = "a table")]
+#[apply(beside_others)]
 fn every_line_has_its_answer() {
-    let _turn = turns::beside_others();
     let Controlled { peer: _peer, daemon, plant, machine: _machine } =
         Controlled::start(Machine::patient("lines"));
     let mut client = Client::connect(&daemon);
     for (line, words) in [
-        ("hello\n".to_owned(), "no request: expected value"),
+        ("hello\n", "no request: expected value"),
         (
-            "{\"version\": 2, \"request\": \"estop\"}\n".into(),
+            "{\"version\": 2, \"request\": \"engage\"}\n",
             "version 2 of the protocol; this daemon has version 1",
         ),
         (
-            request("dance", json!({})),
+            "{\"version\": 1, \"request\": \"dance\"}\n",
             "unknown request \"dance\"; must be one of status, record, reload, goto, hold, jog, engage, clear, park, stop, off, estop",
         ),
-        (request("estop", json!({"wiat": true})), "unknown field `wiat`"),
+        ("{\"version\": 1, \"request\": \"engage\", \"wiat\": true}\n", "unknown field `wiat`"),
+        ("{\"version\": 1, \"request\": \"record\"}\n", "record needs an open file"),
     ] {
-        client.send(&line);
+        client.send(line);
         let answer = client.answer();
         assert_eq!(answer["result"], "invalid");
         assert!(answer["text"].as_str().is_some_and(|text| text.contains(words)), "{answer}");
     }
     // Nothing of that stopped it. Several lines at once, and one in pieces.
-    client.send(&(request("status", json!({})) + &request("clear", json!({})) + "{\"version\": 1, "));
-    let (first, second) = (client.answer(), client.answer());
-    assert_eq!((first["request"].as_str(), first["state"].as_str()), (Some("status"), Some("active")));
-    assert_eq!(
-        (second["result"].as_str(), second["diagnostic"]["code"].as_u64()),
-        (Some("refused"), Some(9))
+    client.send(
+        "{\"version\": 1, \"request\": \"status\"}\n{\"version\": 1, \"request\": \"clear\"}\n{\"version\": 1, ",
     );
+    let is = |answer: &Value, result: &str, key: &str, value: Value| {
+        let found = answer.pointer(key).unwrap_or(&Value::Null);
+        assert_eq!((&answer["result"], found), (&result.into(), &value), "{answer}");
+    };
+    is(&client.answer(), "done", "/state", "active".into());
+    is(&client.answer(), "refused", "/diagnostic/code", 9.into());
     client.send("\"request\": \"stop\", \"wait\": true}\n");
-    let answer = client.answer();
-    assert_eq!(
-        (answer["result"].as_str(), answer["state"].as_str()),
-        (Some("done"), Some("standby")),
-        "{answer}"
-    );
+    is(&client.answer(), "done", "/state", "standby".into());
     // A later line replaces one that waits.
-    client.send(&request("engage", json!({"wait": true, "until_ready": true})));
-    let answer = client.answer();
-    assert_eq!(
-        (answer["result"].as_str(), answer["state"].as_str()),
-        (Some("done"), Some("active")),
-        "{answer}"
-    );
-    client.send(&request("estop", json!({})));
-    let answer = client.answer();
-    assert_eq!(
-        (answer["result"].as_str(), answer["diagnostic"]["code"].as_u64()),
-        (Some("done"), Some(110)),
-        "{answer}"
-    );
-    client.send(&request("engage", json!({"wait": true, "until_ready": true})));
-    let answer = client.answer();
-    assert_eq!(
-        (answer["result"].as_str(), answer["diagnostic"]["code"].as_u64()),
-        (Some("refused"), Some(9)),
-        "{answer}"
-    );
+    let ready = json!({"wait": true, "until_ready": true});
+    is(&client.ask("engage", &ready), "done", "/state", "active".into());
+    is(&client.ask("estop", &json!({})), "done", "/diagnostic/code", 110.into());
+    let answer = client.ask("engage", &ready);
+    is(&answer, "refused", "/diagnostic/code", 9.into());
     assert_eq!(answer["text"], "not possible in state fault (emergency stop); hexad clear first");
     client.send(&"x".repeat(5000));
     assert_eq!(client.answer()["text"], "the line is too long");
     assert!(client.is_closed());
-    daemon.says(&format!("request: estop user=root process={}", std::process::id()));
+    daemon.says(&format!("request: estop user={} process={}", own_name(), std::process::id()));
     let path = path_of(&daemon);
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
     assert!(!path.exists(), "the socket goes with its daemon");
-    plant.stops_on("TERM", HANG);
+    plant.stops();
 }
 
 /// The guide shows a panel in Python; it is what it says.
 #[test]
+#[ignore = "second tier: needs Python"]
+#[apply(beside_others)]
 fn the_panel_of_the_guide_works() {
-    let _turn = turns::beside_others();
     let guide = include_str!("../../docs/operator.md");
     let (_, rest) = guide.split_once("```python\n").expect("an example");
     let (panel, _) = rest.split_once("```").expect("its end");
@@ -112,52 +85,49 @@ fn the_panel_of_the_guide_works() {
     let Ok(ended) = ended else { return lacking("python3") };
     let said = String::from_utf8_lossy(&ended.stdout).into_owned() + &String::from_utf8_lossy(&ended.stderr);
     assert!(ended.status.success() && said.contains("done standby"), "{said}");
-    assert_eq!(status(&machine)["state"], "standby");
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    assert_eq!(state(&machine), "standby");
+    daemon.stops();
+    plant.stops();
 }
 
 /// Runs `hexad REQUEST` as the user nobody.
 fn as_nobody(machine: &Machine, request: &str) -> Ended {
     let mut command = wrapped(machine, &[AS_NOBODY]);
     command.args([request, "--config"]).arg(&machine.file);
-    Hexad::spawn(machine, request, command).ends_within(HANG)
+    Hexad::spawn(machine, request, command).ends()
 }
 
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn another_user_is_told_who_may_and_a_group_opens_it() {
     if cannot(&[AS_NOBODY]) {
         return;
     }
-    let _turn = turns::beside_others();
     for (section, may) in
         [("", false), ("[operator]\ngroup = \"nogroup\"", true), ("[operator]\nmode = \"0666\"", true)]
     {
         let machine = Machine::with("users", &format!("{PATIENT}\n{section}"));
         let daemon = start_daemon(&machine);
         daemon.says("running");
-        let Ended { status, stdout, stderr } = as_nobody(&machine, "estop");
+        let ended = as_nobody(&machine, "estop");
         if may {
-            assert_eq!((status.code(), stdout.trim_end()), (Some(0), "fault"), "{section}: {stderr}");
+            assert_eq!(ended.succeeds().trim_end(), "fault", "{section}");
             daemon.says("request: estop user=nobody process=");
         } else {
             let words = format!("hexad: this user may not send requests for {} (", machine.name);
-            assert!(status.code() == Some(2) && stderr.starts_with(&words), "{stderr}");
-            assert!(
-                stderr.contains("root may; operator.group in the machine file names another group"),
-                "{stderr}"
-            );
-            let Ended { status, stderr, .. } = as_nobody(&machine, "status");
-            assert!(status.code() == Some(2) && stderr.starts_with(&words), "{stderr}");
+            let said = ended.fails(2, "root may; operator.group in the machine file names another group");
+            let status = as_nobody(&machine, "status").fails(2, &words);
+            assert!(said.starts_with(&words) && status.starts_with(&words), "{said}{status}");
             assert!(!daemon.words().contains("nobody"));
         }
-        daemon.stops_on("TERM", HANG);
+        daemon.stops();
     }
 }
 
 #[test]
+#[apply(beside_others)]
 fn status_shows_what_the_daemon_knows() {
-    let _turn = turns::beside_others();
     let trio = Trio::in_motion("status");
     let answer = status(&trio.machine);
     assert_eq!((&answer["state"], &answer["result"]), (&json!("active"), &json!("done")));
@@ -167,11 +137,12 @@ fn status_shows_what_the_daemon_knows() {
         (&json!(1000.0), Some(6))
     );
     assert_eq!(report["stroke_m"], json!([0.85, 1.6]));
-    for (source, process) in [("setpoint", &trio.setpoints), ("measured", &trio.plant)] {
+    for (source, process) in
+        [("setpoint", trio.setpoints.as_ref().expect("a player")), ("measured", &trio.plant)]
+    {
         let sources = report["sources"].as_array().expect("sources");
         let found = sources.iter().find(|found| found["topic"] == source).expect(source);
-        let process =
-            json!([{"process_id": process.id(), "command": "hexad", "user": "root", "is_ignored": false}]);
+        let process = json!([{"process_id": process.id(), "command": "hexad", "user": own_name(), "is_ignored": false}]);
         assert_eq!(found["processes"], process, "{source}");
         assert!(found["age_s"].as_f64().is_some_and(|age_s| age_s < 1.0), "{found}");
     }
@@ -189,8 +160,7 @@ fn status_shows_what_the_daemon_knows() {
     }
     let forces = report["legs"].as_array().expect("legs").iter().map(|leg| leg["force_n"].as_f64());
     assert!(forces.flatten().all(|force| force != 0.0 && force.abs() <= 500.0), "{report}");
-    let file = trio.machine.file.display().to_string();
-    let Ended { stdout, .. } = run(&trio.machine, &["status", "--config", &file]);
+    let stdout = trio.machine.hexad::<&str>("status", &[]).succeeds();
     println!("{stdout}");
     assert!(
         stdout.lines().count() <= 24 && stdout.lines().all(|line| line.chars().count() <= 80),
@@ -221,8 +191,9 @@ print("sent")
 "#;
 
 #[test]
+#[ignore = "second tier: needs Python"]
+#[apply(beside_others)]
 fn certificate_hostile_connections_leave_nothing() {
-    let _turn = turns::beside_others();
     let certificate = Certificate::new("hostile connections", 1_000, 100_000);
     let machine = Machine::patient("files");
     let daemon = start_daemon(&machine);
@@ -240,7 +211,7 @@ fn certificate_hostile_connections_leave_nothing() {
     hostile(certificate.total() * 9 / 10);
     let after = resources(daemon.id());
     assert!(after[0] <= files && after[1] == threads && after[2] <= kilobytes + 256, "{before:?}, {after:?}");
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
     certificate.finish(format!("files, threads, kB: {before:?} before, {after:?} after"));
 }
 
@@ -254,22 +225,20 @@ fn resources(process_id: u32) -> [usize; 3] {
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_daemon_that_may_not_open_enough_files_says_so() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("few-files");
     let start = |limits: &str| {
         let program = env!("CARGO_BIN_EXE_hexad");
         let mut shell = Command::new("sh");
         shell.args([
             "-c",
-            &format!("ulimit {limits}; exec {program} run --config {}", machine.file.display()),
+            &format!("ulimit {limits}; exec '{program}' run --config '{}'", machine.file.display()),
         ]);
         Hexad::spawn(&machine, "run", shell)
     };
-    let Ended { status, stderr, .. } = start("-n 32").ends_within(HANG);
-    assert_ne!(status.code(), Some(0));
-    assert!(stderr.contains("RLIMIT_NOFILE is 32; LimitNOFILE=512"), "{stderr}");
+    start("-n 32").ends().fails(2, "RLIMIT_NOFILE is 32; LimitNOFILE=512");
     let daemon = start("-Sn 32");
     daemon.says("running");
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }

@@ -15,7 +15,6 @@ use crate::support::children::{HANG, Hexad};
 use crate::support::forged::{Change, Forger};
 use crate::support::machine::Machine;
 use crate::support::trio::start_plant;
-use crate::support::turns;
 
 const PERIOD: Duration = Duration::from_millis(1);
 
@@ -60,8 +59,8 @@ fn resealed(message: &mut hexad::messages::ForceMessage, change: Change) {
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_driver_goes_by_good_messages_only() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("doubted");
     let plant = start_plant(&machine);
     plant.says("plant at rest");
@@ -78,7 +77,7 @@ fn a_driver_goes_by_good_messages_only() {
         (0..9).for_each(|_| send(&mut forger, |_| {}));
         send(&mut forger, wrong);
     }
-    let words = plant.stops_on("TERM", HANG).stderr;
+    let words = plant.stops();
     assert_eq!(words.matches(CLOSING).count(), WRONG.len(), "{words}");
     for (_, reason) in WRONG {
         assert!(words.contains(&format!("rejected in total: forces {reason}")), "{reason}: {words}");
@@ -88,8 +87,8 @@ fn a_driver_goes_by_good_messages_only() {
 
 /// Closed brakes before the first force; then all drives enabled, all brakes open, and the force that was sent.
 #[test]
+#[apply(beside_others)]
 fn a_plant_reports_its_drives() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("reporting");
     let plant = start_plant(&machine);
     plant.says("plant at rest");
@@ -113,7 +112,7 @@ fn a_plant_reports_its_drives() {
     };
     reports([0.0; LEGS], 0, 0);
     reports(holding(&machine), 0b11_1111, 0b11_1111);
-    plant.stops_on("TERM", HANG);
+    plant.stops();
 }
 
 /// What holds the platform up at home.

@@ -2,56 +2,49 @@
 
 use serde_json::Value;
 
-use crate::support::children::{HANG, Hexad, run};
+use crate::support::children::run;
 use crate::support::machine::Machine;
-use crate::support::turns;
+use crate::support::trio::start_daemon;
 
 /// A machine whose threads are bound to these processors.
 fn bound(test: &str, cpu: usize, io_cpu: usize) -> Machine {
     Machine::with(test, &format!("[realtime]\ncpu = {cpu}\nio_cpu = {io_cpu}"))
 }
 
-fn started(machine: &Machine) -> Hexad {
-    let daemon = Hexad::start::<&str>(machine, "run", &[]);
-    daemon.says("running");
-    daemon
-}
-
 /// Columns of a machine in the list.
 fn listed(machine: &Machine) -> Option<Vec<String>> {
-    let ended = run(machine, &["status"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let line = ended.stdout.lines().find(|line| line.starts_with(&format!("{} ", machine.name)))?;
+    let stdout = run(machine, &["status"]).succeeds();
+    let line = stdout.lines().find(|line| line.starts_with(&format!("{} ", machine.name)))?;
     Some(line.split_whitespace().map(String::from).collect())
 }
 
 #[test]
+#[apply(beside_others)]
 fn two_machines_may_not_share_a_processor() {
-    let _turn = turns::beside_others();
     // That a thread cannot be bound to these is only a warning.
     let (first, second, third) =
         (bound("first", 1000, 1001), bound("second", 1002, 1000), bound("third", 1003, 1002));
-    let daemon = started(&first);
-    let refused = Hexad::start::<&str>(&second, "run", &[]).ends_within(HANG);
+    let daemon = start_daemon(&first);
     let reason = format!(
         "cannot use processor 1000: {} does (process {}); give each machine its own [realtime] cpu and io_cpu",
         first.name,
         daemon.id()
     );
-    assert!(refused.status.code() != Some(0) && refused.stderr.contains(&reason), "{}", refused.stderr);
+    start_daemon(&second).ends().fails(1, &reason);
     assert_eq!(listed(&second), None, "its record is gone");
-    let beside = started(&third);
-    beside.stops_on("TERM", HANG);
-    daemon.stops_on("TERM", HANG);
+    let beside = start_daemon(&third);
+    beside.stops();
+    daemon.stops();
     // Its processor is free now.
-    started(&second).stops_on("TERM", HANG);
+    start_daemon(&second).stops();
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
 fn the_list_of_machines_has_each_with_state_and_rate() {
-    let _turn = turns::beside_others();
     let machines = [bound("listed", 1020, 1021), Machine::patient("listed")];
-    let daemons = machines.each_ref().map(started);
+    let daemons = machines.each_ref().map(start_daemon);
     for (machine, (daemon, processors)) in
         machines.iter().zip(daemons.iter().zip([&["1020,", "1021"][..], &["any"]]))
     {
@@ -73,7 +66,7 @@ fn the_list_of_machines_has_each_with_state_and_rate() {
     assert_eq!(listed(&machines[0]).expect("a line")[1..3], ["unknown", "unknown"]);
     held.signal("CONT");
     for daemon in [held, other] {
-        daemon.stops_on("TERM", HANG);
+        daemon.stops();
     }
     assert!(machines.iter().all(|machine| listed(machine).is_none()));
 }

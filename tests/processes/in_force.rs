@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use crate::common::not_run::lacking;
-use crate::support::children::{HANG, Hexad};
+use crate::support::children::Hexad;
 use crate::support::machine::Machine;
 use crate::support::trio::start_daemon;
-use crate::support::turns;
+use hexad_support::not_run::lacking;
 
 /// Scheduling classes as numbers, and a priority or 0: see sched(7).
 const OTHER: (u32, u32) = (0, 0);
@@ -23,9 +22,10 @@ struct Thread {
 }
 
 #[test]
+#[ignore = "second tier: needs real-time rights"]
+// Daemons that are bound to the same processor are refused: all others with this one run alone.
+#[apply(beside_others)]
 fn priorities_and_the_processor_of_the_loop_alone() {
-    // Daemons that are bound to the same processor are refused: all others with this one run alone.
-    let _turn = turns::beside_others();
     let Some((daemon, _machine)) = granted("priorities_and_the_processor_of_the_loop_alone", "cpu = 0")
     else {
         return;
@@ -46,19 +46,20 @@ fn priorities_and_the_processor_of_the_loop_alone() {
     let locked = status.lines().find_map(|line| line.strip_prefix("VmLck:")).expect("VmLck");
     assert_ne!(locked.trim(), "0 kB");
     assert!(holds_idle_states(&daemon));
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 #[test]
+#[ignore = "second tier: needs real-time rights"]
+#[apply(beside_others)]
 fn sched_deadline_for_the_loop_alone() {
-    let _turn = turns::beside_others();
     let test = "sched_deadline_for_the_loop_alone";
     let Some((daemon, _machine)) = granted(test, "scheduler = \"deadline\"") else { return };
     let threads = threads(&daemon);
     let classes: Vec<_> =
         ["hexad", "hexad-control", "hexad-io", "hexad-rt"].iter().map(|name| threads[*name].class).collect();
     assert_eq!(classes, [OTHER, (FIFO, 2), (FIFO, 79), (DEADLINE, 0)]);
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 /// A daemon with these keys of `[realtime]`; none, and said so, where the system lacks the rights.

@@ -5,12 +5,12 @@ use hexad::control::signals::state::Request;
 use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
 
-use crate::support::children::{Ended, HANG, Hexad};
+use crate::support::children::Hexad;
 use crate::support::machine::PERIOD_NS;
+use crate::support::operator;
 use crate::support::recorder::Recording;
 use crate::support::rules::stands;
 use crate::support::trio::{Trio, start_daemon, start_plant, start_setpoints, valid_after};
-use crate::support::{operator, turns};
 
 /// An outage: from the kill to the restart \[ns\].
 struct Outage {
@@ -19,14 +19,14 @@ struct Outage {
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_killed_plant_comes_back() {
-    let _turn = turns::beside_others();
     let mut trio = Trio::in_motion("killed-plant");
     let from_ns = monotonic_ns();
     trio.plant.kill();
     trio.loses_force_for(DiagnosticCode::MeasurementLost);
     trio.daemon.says("fault: measurement lost");
-    trio.setpoints.says("the daemon gave up control or is gone");
+    trio.setpoints().says("the daemon gave up control or is gone");
     let to_ns = monotonic_ns();
     trio.plant = start_plant(&trio.machine);
     operator::clear_and_engage(&trio.machine);
@@ -36,11 +36,11 @@ fn a_killed_plant_comes_back() {
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_killed_setpoint_source_comes_back() {
-    let _turn = turns::beside_others();
     let mut trio = Trio::in_motion("killed-setpoints");
     let from_ns = monotonic_ns();
-    trio.setpoints.kill();
+    trio.setpoints().kill();
     trio.loses_force_for(DiagnosticCode::SetpointLost);
     trio.daemon.says("stopping: setpoint lost in motion");
     trio.daemon.says("fault: setpoint lost in motion");
@@ -54,9 +54,8 @@ fn a_killed_setpoint_source_comes_back() {
         let asked = recording.commands.last()?;
         (asked.request == Request::Engage as u32 && asked.header.time_ns > to_ns).then_some(())
     });
-    trio.setpoints = start_setpoints(&trio.machine);
-    let Ended { status, stderr, .. } = engages.ends_within(HANG);
-    assert_eq!(status.code(), Some(0), "{stderr}");
+    trio.setpoints = Some(start_setpoints(&trio.machine));
+    engages.ends().succeeds();
     trio.moves_after(to_ns);
     let recording = trio.finish();
     let outage = Outage { from_ns, to_ns };
@@ -65,14 +64,14 @@ fn a_killed_setpoint_source_comes_back() {
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_killed_daemon_comes_back() {
-    let _turn = turns::beside_others();
     let mut trio = Trio::in_motion("killed-daemon");
     let from_ns = monotonic_ns();
     trio.daemon.kill();
     let killed_ns = monotonic_ns();
     trio.plant.says("forces stopped arriving: brakes closing");
-    trio.setpoints.says("the daemon gave up control or is gone");
+    trio.setpoints().says("the daemon gave up control or is gone");
     trio.stands();
     let to_ns = monotonic_ns();
     trio.daemon = start_daemon(&trio.machine);

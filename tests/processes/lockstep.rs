@@ -7,19 +7,18 @@ use std::time::{Duration, Instant};
 use std::{env, fs, thread};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
-use hexad::commands::plant::hardware;
 use hexad::config::Config;
 use hexad::messages::Bus;
 use hexad::messages::layout::FieldType;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 use hexad::realtime::setup::scheduling;
 
-use crate::common::shipped;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PERIOD_NS};
+use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::trio::player_ended;
-use crate::support::{operator, turns};
+use hexad_support::shipped;
 
 const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
 
@@ -72,7 +71,8 @@ impl Build {
             let bus = Bus::join_simulated(&machine.name).expect("to join");
             let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
             let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
-            let mut hardware = hardware(&Config::load(&machine.file).expect("the machine file"));
+            let config = Config::load(&machine.file).expect("the machine file");
+            let mut hardware = config.deployment.plant.hardware(&config.machine);
             let driver = Bus::join(&machine.name).expect("to join");
             let mut driver = driver.subscriber::<ForceMessage>(1).expect("to subscribe");
             let (daemon, source) = self.start_both(&machine);
@@ -111,9 +111,9 @@ impl Build {
                 }
             }
             assert_eq!(driver.receive_latest(), None, "a driver of the same machine");
-            assert_eq!(source.ends_within(HANG).status.code(), Some(0));
-            let ended = daemon.stops_on("TERM", HANG);
-            assert!(ended.stderr.contains("TIME IS SIMULATED"), "{}", ended.stderr);
+            source.ends().succeeds();
+            let words = daemon.stops();
+            assert!(words.contains("TIME IS SIMULATED"), "{words}");
             said
         };
         thread::spawn(run).join().expect("the plant")
@@ -126,10 +126,10 @@ impl Build {
         let recorder = Recorder::start_simulated(&machine.name);
         let plant = self.start(&machine, &["plant"]);
         let (daemon, source) = self.start_both(&machine);
-        assert_eq!(source.ends_within(10 * HANG).status.code(), Some(0));
+        source.ends_within(10 * HANG).succeeds();
         daemon.says("standby: setpoint source ended");
-        plant.stops_on("TERM", HANG);
-        daemon.stops_on("TERM", HANG);
+        plant.stops();
+        daemon.stops();
         recorder.finish().forces
     }
 }
@@ -164,8 +164,9 @@ fn assert_heard(all: &[ForceMessage], heard: &[ForceMessage], what: &str) {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
 fn in_lock_step_the_forces_are_the_same_bytes_on_one_processor_and_on_two() {
-    let _turn = turns::beside_others();
     let first = Build::this(None).forces_for_us();
     let valid = first.iter().filter(|force| force.valid == 1).count();
     assert!(valid > LEAST, "{valid} cycles under control");
@@ -176,8 +177,8 @@ fn in_lock_step_the_forces_are_the_same_bytes_on_one_processor_and_on_two() {
 
 /// They stamp with what they have heard, as there is no other time.
 #[test]
+#[apply(beside_others)]
 fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
-    let _turn = turns::beside_others();
     let machine = Machine::with("lock-step-operated", LOCKSTEP);
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
@@ -190,16 +191,16 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "200"]);
     source.says("the setpoints hold the pose of the platform");
     operator::engage(&machine);
-    let ended = daemon.stops_on("TERM", HANG);
-    assert!(!ended.stderr.contains("did not come to rest"), "{}", ended.stderr);
+    let words = daemon.stops();
+    assert!(!words.contains("did not come to rest"), "{words}");
     player_ended(source);
-    plant.stops_on("TERM", HANG);
+    plant.stops();
 }
 
 /// From its first message on the daemon follows a source: it must not be home.
 #[test]
+#[apply(beside_others)]
 fn in_lock_step_a_source_begins_where_the_platform_is_held() {
-    let _turn = turns::beside_others();
     let follows_any = "\n[setpoint]\non_violation = \"limit\"\n";
     let machine = Machine::with("lock-step-held", &format!("{LOCKSTEP}{follows_any}"));
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
@@ -211,22 +212,22 @@ fn in_lock_step_a_source_begins_where_the_platform_is_held() {
         fs::write(&file, format!("t,alpha,beta,gamma,x,y,z\n{rows}")).unwrap();
         let options = ["--trajectory", file.to_str().unwrap(), "--hold", option];
         let options = &options[..if option == "--hold" { 3 } else { 4 }];
-        let ended = Hexad::start(&machine, "move", options).ends_within(HANG);
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        machine.hexad("move", options).succeeds();
     }
-    let said = daemon.stops_on("TERM", HANG).stderr;
+    let said = daemon.stops();
     assert_eq!(said.matches("active:").count(), 1, "{said}");
-    plant.stops_on("TERM", HANG);
+    plant.stops();
 }
 
 /// The forces of this build and of another are the same bytes.
+#[apply(beside_others)]
 fn assert_same_as(other: PathBuf, what: &str) {
-    let _turn = turns::beside_others();
-    let other = Build { program: other, cpu: None };
+    let other = Build { program: other.clone(), cpu: None };
     assert_heard(&Build::this(None).forces_for_us(), &other.forces_overheard(), what);
 }
 
 #[test]
+#[ignore = "second tier: builds the release"]
 fn in_lock_step_the_forces_are_the_same_bytes_as_those_of_the_shipped_program() {
     assert_same_as(shipped::program(), "shipped");
 }

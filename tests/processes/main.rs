@@ -13,20 +13,19 @@
 )]
 #![allow(clippy::std_instead_of_core, reason = "tests of processes have an operating system")]
 
-#[path = "../common/mod.rs"]
-mod common;
+#[macro_use]
+extern crate macro_rules_attribute;
+
+#[macro_use]
 mod support;
 mod test_threads;
 
 mod alone;
 mod always_stops;
-mod command_line;
 mod control_socket;
 mod doctor;
 mod doubted;
-mod examined;
 mod excite;
-mod fidelity;
 mod frames;
 mod guides;
 mod hosted;
@@ -35,28 +34,27 @@ mod in_force;
 mod killed;
 mod locked_memory;
 mod lockstep;
-mod modes;
 mod orderly_stop;
+mod other_poses;
 mod other_users;
 mod other_version;
 mod overruns;
-mod pages;
 mod panels;
 mod paused;
 mod players;
 mod readme;
 mod recordings;
 mod refusals;
-mod released;
 mod reload;
 mod remains;
+mod remarks;
 mod requests;
-mod rotations;
 mod rounds;
 mod stale;
-mod tables;
+mod stops_supersede;
 mod targets;
 mod trajectory;
 mod two_sources;
 mod udp;
+mod view;
 mod wrong_senders;

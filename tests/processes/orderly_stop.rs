@@ -11,35 +11,25 @@ use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::recorder::Recorder;
 use crate::support::trio::{Trio, fastest, player_ended, start_daemon, start_setpoints};
-use crate::support::{operator, rules, turns};
+use crate::support::{operator, rules};
 
 /// What ends later hangs: a busy host has held up the removal of files at the end of all processes for more than 2 s.
 const SOON: Duration = Duration::from_secs(20);
 
+/// The daemon first: the platform is in motion under its force. All other tests end everything by SIGTERM.
 #[test]
-fn sigterm_ends_each_process_in_order() {
-    let _turn = turns::beside_others();
-    stops_in_motion("TERM");
-}
-
-#[test]
+#[apply(beside_others)]
 fn sigint_ends_each_process_in_order() {
-    let _turn = turns::beside_others();
-    stops_in_motion("INT");
-}
-
-/// The daemon first: the platform is in motion under its force.
-fn stops_in_motion(signal: &str) {
     let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("orderly-stop");
-    let ended = daemon.stops_on(signal, SOON);
+    let ended = daemon.stops_on("INT", SOON);
     assert!(ended.stderr.contains("stopping"), "{}", ended.stderr);
     // At rest the daemon says why it does not engage: of two such messages the plant reads the newest.
     plant.says("): brakes closing");
-    player_ended(setpoints);
+    setpoints.into_iter().for_each(player_ended);
     recorder.until("the platform stands", |recording| {
         recording.measured.last().filter(|m| rules::stands(m)).map(drop)
     });
-    plant.stops_on(signal, SOON);
+    plant.stops_on("INT", SOON);
 
     let recording = recorder.finish();
     rules::hold(&recording);
@@ -69,40 +59,34 @@ fn counts(path: &Path) -> [u64; 4] {
 
 /// Two of them would fight for the forces.
 #[test]
+#[apply(beside_others)]
 fn a_second_daemon_of_the_same_machine_is_refused() {
-    let _turn = turns::beside_others();
-    let Trio { setpoints, mut daemon, plant, recorder, machine } = Trio::in_motion("second");
-    let second = start_daemon(&machine).ends_within(HANG);
-    assert_eq!(second.status.code(), Some(1), "{}", second.stderr);
-    assert!(second.stderr.contains("another daemon does"), "{}", second.stderr);
-    daemon.kill();
+    let mut trio = Trio::in_motion("second");
+    start_daemon(&trio.machine).ends().fails(1, "another daemon does");
+    trio.daemon.kill();
     // The lock dies with its holder.
-    let third = start_daemon(&machine);
-    operator::engage(&machine);
-    third.stops_on("TERM", SOON);
-    player_ended(setpoints);
-    plant.stops_on("TERM", SOON);
-    rules::hold(&recorder.finish());
+    trio.daemon = start_daemon(&trio.machine);
+    operator::engage(&trio.machine);
+    trio.finish();
 }
 
 #[test]
+#[apply(beside_others)]
 fn processes_that_wait_for_others_stop_as_well() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("waiting-stop");
     let daemon = start_daemon(&machine);
     daemon.says("off: no measurement");
     let setpoints = start_setpoints(&machine);
     setpoints.says("waiting: the pose of the platform is unknown: no measurement");
-    setpoints.interrupted_on("INT", SOON);
-    daemon.stops_on("TERM", SOON);
-    let report = fs::read_to_string(machine.path("report.json")).expect("the report");
-    let report: Report = serde_json::from_str(&report).expect("JSON");
+    setpoints.interrupted_on("INT");
+    daemon.stops();
+    let report = Report::read(&machine.path("report.json")).expect("the report");
     assert_eq!(report.tracking.position_max_m, 0.0, "nothing was tracked");
 }
 
 #[test]
+#[apply(beside_others)]
 fn an_interrupted_demo_takes_its_processes_with_it() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("demo-stop");
     let charts = machine.path("charts");
     let demo = Hexad::start(
@@ -115,9 +99,7 @@ fn an_interrupted_demo_takes_its_processes_with_it() {
     recorder
         .until("forces are valid", |recording| recording.forces.last().filter(|f| f.valid == 1).map(drop));
     demo.signal("INT");
-    let ended = demo.ends_within(HANG);
-    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
-    assert!(ended.stderr.contains("stopped by a signal"), "{}", ended.stderr);
+    demo.ends().fails(1, "stopped by a signal");
     // The daemon is told to stop when the demo is gone; nobody sends after that.
     let count = || {
         let recording = recorder.so_far();

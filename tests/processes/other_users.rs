@@ -4,10 +4,9 @@ use std::fs;
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::support::children::{Ended, HANG, Hexad};
+use crate::support::children::{Ended, Hexad};
 use crate::support::host::{Host, MALLORY, NOGROUP, OPERATOR, SERVICE};
 use crate::support::machine::Machine;
-use crate::support::turns;
 
 /// The machine file there.
 const FILE: &str = "/run/test/machine.toml";
@@ -64,8 +63,9 @@ fn says(ended: &Ended, code: i32, stdout: &str, stderr: &str) {
 
 /// Another user's answer never counts: neither beside the operator's own daemon, nor alone, nor for root.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn another_users_answer_does_not_count() {
-    let _turn = turns::beside_others();
     let Some(host) = host("impostor", "") else { return };
     let name = host.machine().name.clone();
     let mut impostor = impostor(&host, "done", &[&name]);
@@ -88,7 +88,7 @@ fn another_users_answer_does_not_count() {
             if request == "estop" {
                 daemon.says(STOPPED);
             }
-            daemon.stops_on("TERM", HANG);
+            daemon.stops();
         }
     }
     assert!(
@@ -100,8 +100,9 @@ fn another_users_answer_does_not_count() {
 
 /// The service and the operator's practice daemon have the same name: both stop, and the service's answer counts.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn the_service_is_stopped_beside_a_practice_daemon() {
-    let _turn = turns::beside_others();
     let Some(host) = host("practice", "[operator]\nmode = \"0666\"") else { return };
     let name = host.machine().name.clone();
     host.does(&format!("mkdir -m 755 /run/hexad && chown {SERVICE}:{SERVICE} /run/hexad"));
@@ -122,14 +123,15 @@ fn the_service_is_stopped_beside_a_practice_daemon() {
     let ended = host.run(OPERATOR, &[], &["estop", FILE]);
     says(&ended, 1, "", "cannot be signalled");
     service.signal("CONT");
-    service.stops_on("TERM", HANG);
-    practice.stops_on("TERM", HANG);
+    service.stops();
+    practice.stops();
 }
 
 /// Only a daemon that counts is signalled: whoever handles no SIGUSR1 dies of it.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn nobody_else_is_signalled() {
-    let _turn = turns::beside_others();
     let Some(host) = host("signalled", "") else { return };
     let name = host.machine().name.clone();
     let mut impostor = impostor(&host, "none", &[&name]);
@@ -140,8 +142,9 @@ fn nobody_else_is_signalled() {
 }
 
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn one_lock_whatever_the_environment_and_other_users_have_made() {
-    let _turn = turns::beside_others();
     let Some(host) = host("lock", "") else { return };
     // Another user has taken the names, and gives one back later.
     host.does(&format!(
@@ -156,7 +159,7 @@ fn one_lock_whatever_the_environment_and_other_users_have_made() {
     let daemon = start("/run/a");
     daemon.says("running");
     let refused = |folder| {
-        let Ended { status, stderr, .. } = start(folder).ends_within(HANG);
+        let Ended { status, stderr, .. } = start(folder).ends();
         assert!(status.code() == Some(1) && stderr.contains("another daemon does"), "{stderr}");
     };
     refused("/run/b");
@@ -164,13 +167,14 @@ fn one_lock_whatever_the_environment_and_other_users_have_made() {
     refused("/run/a");
     says(&host.run(OPERATOR, &[], &["estop", FILE]), 0, "fault", "");
     daemon.says(STOPPED);
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 /// Processes of the daemon are not seen from the operator's container.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn an_operator_in_another_container_reaches_the_daemon() {
-    let _turn = turns::beside_others();
     let Some(host) = host("container", "") else { return };
     let daemon = host.daemon(OPERATOR, &[], None);
     let isolated = |request: &str| {
@@ -188,7 +192,7 @@ fn an_operator_in_another_container_reaches_the_daemon() {
             "--clear-groups",
         ]);
         command.args(["/run/test/hexad", request, FILE]);
-        host.spawn(request, command).ends_within(HANG)
+        host.spawn(request, command).ends()
     };
     let status = isolated("status");
     assert!(
@@ -200,13 +204,14 @@ fn an_operator_in_another_container_reaches_the_daemon() {
     says(&isolated("estop"), 0, "fault", "");
     daemon.says(STOPPED);
     says(&isolated("clear"), 0, "off", "");
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 /// Reading is a right of its own, and who has none is not told that nothing runs.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn a_reader_sees_the_status_and_sends_nothing() {
-    let _turn = turns::beside_others();
     let Some(host) = host("reader", "[operator]\nread_group = \"nogroup\"") else { return };
     let name = host.machine().name.clone();
     host.does(&format!("mkdir -m 755 /run/hexad && chown {SERVICE}:{SERVICE} /run/hexad"));
@@ -229,10 +234,10 @@ fn a_reader_sees_the_status_and_sends_nothing() {
     // Not by hand either.
     let mut command = host.program(MALLORY, &[NOGROUP], "python3");
     command.args(["-c", ESTOP_BY_HAND]).arg(format!("/run/hexad/{name}.read"));
-    let answer = host.spawn("by-hand", command).ends_within(HANG);
+    let answer = host.spawn("by-hand", command).ends();
     assert!(answer.stdout.contains("this socket is for reading"), "{}{}", answer.stdout, answer.stderr);
     assert!(!service.words().contains(STOPPED));
-    service.stops_on("TERM", HANG);
+    service.stops();
     assert!(!host.path(&format!("/run/hexad/{name}.read")).exists());
 }
 
@@ -246,8 +251,9 @@ print(link.makefile().readline())
 
 /// As systemd-logind does it when the last session of a user ends.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn shared_memory_that_is_deleted_under_a_daemon_is_named_with_the_remedy() {
-    let _turn = turns::beside_others();
     let Some(host) = host("deleted", "") else { return };
     let name = host.machine().name.clone();
     let daemon = host.daemon(OPERATOR, &[], None);
@@ -261,12 +267,13 @@ fn shared_memory_that_is_deleted_under_a_daemon_is_named_with_the_remedy() {
     assert!(plant.status.code() == Some(2) && plant.stderr.contains("RemoveIPC=no"), "{}", plant.stderr);
     // It still stops.
     says(&host.run(OPERATOR, &[], &["estop", FILE]), 0, "fault", "");
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn shared_memory_that_may_not_be_written_is_named() {
-    let _turn = turns::beside_others();
     let Some(host) = host("unwritable", "") else { return };
     host.does("chmod 755 /dev/shm");
     let ended = host.run(OPERATOR, &[], &["run", "/run/test/machine.toml"]);
@@ -275,8 +282,9 @@ fn shared_memory_that_may_not_be_written_is_named() {
 
 /// Nobody types a name in an emergency.
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn without_a_name_what_runs_is_stopped() {
-    let _turn = turns::beside_others();
     let Some(host) = host("nameless", "") else { return };
     let ask = |arguments: &[&str]| host.run(OPERATOR, &[], arguments);
     for request in ["estop", "stop", "off"] {
@@ -304,6 +312,6 @@ fn without_a_name_what_runs_is_stopped() {
     assert!(!foreign.words().contains(STOPPED));
     impostor.must_run();
     for daemon in [foreign, first, second] {
-        daemon.stops_on("TERM", HANG);
+        daemon.stops();
     }
 }

@@ -4,13 +4,11 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-use crate::common::not_run::lacking;
-use crate::common::python::environment;
-use crate::support::children::HANG;
 use crate::support::disturbance::line_of;
 use crate::support::host::Host;
 use crate::support::machine::Machine;
-use crate::support::turns;
+use hexad_support::not_run::lacking;
+use hexad_support::python::environment;
 
 /// Takes part until its input ends: folder of the shared memory, topic. Says whether it could.
 const PARTICIPANT: &str = r#"
@@ -35,15 +33,15 @@ fn participant(python: &Path, host: &Host) -> (Child, String) {
     let mut command = host.program(0, &[], python.join("bin/python"));
     let topic = format!("hexad/{}/measured", host.machine().name);
     command.args(["-c", PARTICIPANT, "/run/hexad-root", &topic]);
-    let mut child =
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("a Python");
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("a Python");
     let said = line_of(&mut BufReader::new(child.stdout.take().expect("a pipe")));
     (child, said)
 }
 
 #[test]
+#[ignore = "second tier: needs PyPI"]
+#[apply(beside_others)]
 fn a_participant_with_another_version_of_iceoryx2_is_named() {
-    let _turn = turns::beside_others();
     let python = match environment(&["iceoryx2==0.10.0".into()]) {
         Ok(python) => python,
         Err(why) => return lacking(&why),
@@ -54,7 +52,7 @@ fn a_participant_with_another_version_of_iceoryx2_is_named() {
     let (mut refused, said) = participant(&python, &host);
     assert!(said.starts_with("refused: ") && said.contains("ServiceInCorruptedState"), "{said}");
     refused.wait().expect("its end");
-    first.stops_on("TERM", HANG);
+    first.stops();
 
     let (mut other, said) = participant(&python, &host);
     assert_eq!(said, "takes part");

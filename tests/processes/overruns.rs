@@ -11,13 +11,12 @@ use hexad::control::signals::state::State;
 use hexad::daemon::report::Report;
 use hexad::messages::ForceMessage;
 
-use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS, TIMEOUT_NS};
 use crate::support::peer::Controlled;
 use crate::support::recorder::{Recorder, Recording};
 use crate::support::steps::{Step, steps};
 use crate::support::trio::{let_pass, start_daemon};
-use crate::support::{operator, rules, turns};
+use crate::support::{operator, rules};
 
 /// Shorter than every timeout, longer than what is caught up.
 const HOLD: Duration = Duration::from_millis(30);
@@ -71,8 +70,8 @@ fn attempt(keys: &str) -> (Vec<Hold>, Recording, Report) {
         recording.forces.last().filter(|force| force.header.time_ns > end_ns).map(drop)
     });
     daemon.must_run();
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
     let recording = recorder.finish();
     rules::hold(&recording);
     (holds, recording, Report::read(&machine.path("report.json")).expect("the report"))
@@ -126,8 +125,8 @@ fn every_miss_has_its_reason(steps: &[Step]) {
 }
 
 #[test]
+#[apply(beside_others)]
 fn skip_counts_every_point_and_never_bursts() {
-    let _turn = turns::beside_others();
     let (holds, recording, report) = held("on_overrun = \"skip\"");
     let steps = steps(&recording);
     every_miss_has_its_reason(&steps);
@@ -155,8 +154,8 @@ fn skip_counts_every_point_and_never_bursts() {
 }
 
 #[test]
+#[apply(beside_others)]
 fn catch_up_runs_at_most_so_many_at_once() {
-    let _turn = turns::beside_others();
     let (holds, recording, report) = held(&format!("on_overrun = \"catch_up\"\nmax_catch_up = {MOST}"));
     let steps = steps(&recording);
     every_miss_has_its_reason(&steps);
@@ -183,8 +182,8 @@ fn catch_up_runs_at_most_so_many_at_once() {
 }
 
 #[test]
+#[apply(beside_others)]
 fn fault_stops_from_the_cycle_after_a_miss_on_and_from_no_other() {
-    let _turn = turns::beside_others();
     let (holds, recording, report) = held("on_overrun = \"fault\"");
     let missed = DiagnosticCode::DeadlineMissed;
     let steps = steps(&recording);

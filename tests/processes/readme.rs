@@ -12,11 +12,10 @@ use hexad::plant::simulator::Simulator;
 use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
 
-use crate::support::children::HANG;
 use crate::support::machine::{Machine, PERIOD_NS};
 use crate::support::recorder::Recorder;
 use crate::support::trio::{let_pass, start_daemon};
-use crate::support::{operator, peer, turns};
+use crate::support::{operator, peer};
 
 include!("support/driver.in");
 
@@ -58,8 +57,8 @@ fn brake() {
 }
 
 #[test]
+#[apply(beside_others)]
 fn the_driver_of_the_readme_connects_a_machine() {
-    let _turn = turns::beside_others();
     let driver = include_str!("support/driver.in");
     assert!(
         include_str!("../../README.md").contains(&format!("```rust\n{driver}```")),
@@ -88,7 +87,7 @@ fn the_driver_of_the_readme_connects_a_machine() {
     operator::engage(&machine);
     let_pass(Duration::from_millis(500));
     operator::does(&machine, "stop", &[], &["standby"]);
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
     drop(peer);
     // It waits for its drives from now on.
     with_machine(|machine| machine.ends = true);

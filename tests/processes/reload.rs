@@ -6,14 +6,13 @@ use std::time::Instant;
 
 use serde_json::Value;
 
-use crate::support::children::{Ended, HANG, Hexad, hexad};
+use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::nobody::{AS_NOBODY, cannot, wrapped};
-use crate::support::operator::{ask, does, is_refused};
+use crate::support::operator::{ask, does, is_refused, own_name};
 use crate::support::peer::Controlled;
-use crate::support::socket::status;
+use crate::support::socket::{state, status};
 use crate::support::trio::start_daemon;
-use crate::support::turns;
 
 /// Sections of the machine file, each key once.
 const SECTIONS: &str = "
@@ -53,8 +52,8 @@ fn sha1(machine: &Machine) -> Value {
 }
 
 #[test]
+#[apply(beside_others)]
 fn gains_limits_and_timeouts_are_taken_over_in_standby_and_not_under_control() {
-    let _turn = turns::beside_others();
     let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(machine("reload"));
     let before = in_force(&machine);
     assert_eq!(before, (sha1(&machine), 0.into(), 90.0.into()));
@@ -75,27 +74,26 @@ fn gains_limits_and_timeouts_are_taken_over_in_standby_and_not_under_control() {
     assert_eq!(in_force(&machine), before);
     daemon.says("reload was refused, nothing has changed: not possible in state active");
     does(&machine, "stop", &[], &["standby"]);
-    let Ended { status, stdout, stderr } = ask(&machine, "reload", &[]);
-    assert_eq!(status.code(), Some(0), "{stderr}");
+    let stdout = ask(&machine, "reload", &[]).succeeds();
     let changes = "on: timeouts.setpoint_ms: 400.0 -> 300.0; limits.condition: 90.0 -> 80.0; limits.scale: 0.5 -> 0.1; \
                    control.position_bandwidth_hz: 10.0 -> 8.0\n";
     let file = format!("{}, from cycle ", machine.file.display());
     assert!(stdout.starts_with(&file) && stdout.ends_with(changes), "{stdout}");
-    daemon.says("request: reload user=root process=");
+    daemon.says(&format!("request: reload user={} process=", own_name()));
     daemon.says(&format!("reload: {file}"));
     assert_eq!(in_force(&machine), (sha1(&machine), 1.into(), 80.0.into()));
     assert_eq!(scale(), 0.1);
     // Once more, without a difference.
-    let Ended { stdout, .. } = ask(&machine, "reload", &[]);
+    let stdout = ask(&machine, "reload", &[]).succeeds();
     assert!(stdout.ends_with("on: nothing that the daemon reads has changed\n"), "{stdout}");
     does(&machine, "engage", &["--wait"], &["active"]);
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
 }
 
 #[test]
+#[apply(beside_others)]
 fn what_is_wrong_or_needs_a_restart_changes_nothing() {
-    let _turn = turns::beside_others();
     let machine = machine("unchanged");
     let daemon = start_daemon(&machine);
     daemon.says("running");
@@ -135,45 +133,49 @@ fn what_is_wrong_or_needs_a_restart_changes_nothing() {
     ] {
         fs::write(&machine.file, &text).expect("to write");
         edit(&machine, &edits);
-        let Ended { status, stdout, stderr } = ask(&machine, "reload", &[]);
-        assert_eq!((status.code(), stdout.as_str()), (Some(1), ""), "{stderr}");
-        assert!(stderr.contains("reload was refused, nothing has changed:\n"), "{stderr}");
-        words
-            .iter()
-            .for_each(|words| assert!(stderr.contains(words.as_str()), "{words} must be in {stderr}"));
+        let ended = ask(&machine, "reload", &[]);
+        assert_eq!(ended.stdout, "");
+        let stderr = ended.fails(1, "reload was refused, nothing has changed:\n");
+        for words in words {
+            assert!(stderr.contains(&words), "{words} must be in {stderr}");
+        }
         assert_eq!(in_force(&machine), before, "{edits:?}");
     }
     fs::remove_file(&machine.file).expect("to remove");
     fs::write(machine.path("name.toml"), &text).expect("to write");
     let mut command = hexad();
     command.args(["reload", "--config"]).arg(machine.path("name.toml"));
-    let Ended { stderr, .. } = Hexad::spawn(&machine, "reload", command).ends_within(HANG);
-    assert!(stderr.contains("machine.toml: could not be read"), "the daemon reads its own file: {stderr}");
-    daemon.stops_on("TERM", HANG);
+    // The daemon reads its own file. A mistake in it keeps nobody from stopping.
+    Hexad::spawn(&machine, "reload", command).ends().fails(1, "machine.toml: could not be read");
+    fs::write(&machine.file, text.replace("= 10.0\n", "= -10.0\n")).expect("to write");
+    does(&machine, "off", &[], &["off"]);
+    does(&machine, "estop", &[], &["fault"]);
+    assert_eq!(state(&machine), "fault");
+    daemon.stops();
 }
 
 #[test]
+#[ignore = "second tier: needs root"]
+#[apply(beside_others)]
 fn another_user_may_not_reload() {
     if cannot(&[AS_NOBODY]) {
         return;
     }
-    let _turn = turns::beside_others();
     let machine = machine("foreign");
     let daemon = start_daemon(&machine);
     daemon.says("running");
     edit(&machine, &[("condition = 90.0", "condition = 80.0")]);
     let mut command = wrapped(&machine, &[AS_NOBODY]);
     command.args(["reload", "--config"]).arg(&machine.file);
-    let Ended { status, stderr, .. } = Hexad::spawn(&machine, "reload", command).ends_within(HANG);
-    assert!(status.code() == Some(2) && stderr.contains("this user may not send requests for "), "{stderr}");
+    Hexad::spawn(&machine, "reload", command).ends().fails(2, "this user may not send requests for ");
     assert_eq!(in_force(&machine).2, 90.0);
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 /// As a service; by hand SIGHUP ends the daemon, as the terminal is closed.
 #[test]
+#[apply(beside_others)]
 fn a_hangup_reloads() {
-    let _turn = turns::beside_others();
     let machine = machine("hangup");
     let mut command = hexad();
     command.args(["run", "--config"]).arg(&machine.file).env("NOTIFY_SOCKET", machine.path("nobody"));
@@ -187,19 +189,5 @@ fn a_hangup_reloads() {
     while in_force(&machine) != (sha1(&machine), 1.into(), 80.0.into()) {
         assert!(began.elapsed() < HANG, "{:?}", in_force(&machine));
     }
-    daemon.stops_on("TERM", HANG);
-}
-
-/// A mistake in the file keeps nobody from stopping.
-#[test]
-fn with_a_file_that_is_not_valid_the_daemon_still_stops() {
-    let _turn = turns::beside_others();
-    let machine = machine("mistaken");
-    let daemon = start_daemon(&machine);
-    daemon.says("running");
-    edit(&machine, &[("= 10.0\n", "= -10.0\n")]);
-    does(&machine, "off", &[], &["off"]);
-    does(&machine, "estop", &[], &["fault"]);
-    assert_eq!(status(&machine)["state"], "fault");
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }

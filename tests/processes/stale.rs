@@ -9,14 +9,12 @@ use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
 use serde_json::json;
 
-use crate::support::children::HANG;
 use crate::support::machine::{Machine, TIMEOUT_NS};
 use crate::support::operator::clear;
 use crate::support::peer::Controlled;
 use crate::support::recorder::Recorder;
 use crate::support::socket::{Client, status};
 use crate::support::trio::{Trio, let_pass, start_daemon, valid_after};
-use crate::support::turns;
 
 /// Longer than a request for control stays valid, with room for a slow signal.
 const PAUSE: Duration = Duration::from_millis(1500);
@@ -25,8 +23,8 @@ const PAUSE: Duration = Duration::from_millis(1500);
 const AFTERWARDS: Duration = Duration::from_millis(800);
 
 #[test]
+#[apply(beside_others)]
 fn an_old_engage_is_not_obeyed_and_a_fresh_one_is() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("old-engage");
     let recorder = Recorder::start(&machine.name);
     let daemon = start_daemon(&machine);
@@ -47,20 +45,19 @@ fn an_old_engage_is_not_obeyed_and_a_fresh_one_is() {
     assert_eq!(answer["result"], "stale", "{answer}");
     assert_eq!(answer["text"], "the daemon was held and the request may be old; send it again");
     let_pass(AFTERWARDS);
-    let recording = recorder.so_far();
-    assert!(!recording.forces.iter().any(|force| valid_after(force, from_ns)), "an old request was obeyed");
-    drop(recording);
+    let is_obeyed = recorder.so_far().forces.iter().any(|force| valid_after(force, from_ns));
+    assert!(!is_obeyed, "an old request was obeyed");
     operator.send(Request::Engage).expect("to send");
     recorder.until("a fresh request is obeyed", |recording| {
         recording.forces.last().filter(|force| force.state == State::Active as u32).map(drop)
     });
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
 }
 
 #[test]
+#[apply(beside_others)]
 fn an_old_stop_is_obeyed() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("old-stop");
     let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(machine);
     let mut client = Client::connect(&daemon);
@@ -70,14 +67,14 @@ fn an_old_stop_is_obeyed() {
     daemon.signal("CONT");
     assert_eq!(client.answer()["diagnostic"]["code"], 110);
     clear(&machine);
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
 }
 
 /// Value and bound are those of the cycle in which the fault began, and stay.
 #[test]
+#[apply(beside_others)]
 fn a_latched_fault_keeps_its_value_and_bound() {
-    let _turn = turns::beside_others();
     let mut trio = Trio::in_motion("latched");
     trio.plant.kill();
     trio.loses_force_for(DiagnosticCode::MeasurementLost);

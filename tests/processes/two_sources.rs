@@ -2,59 +2,23 @@
 //! are named, and when one leaves the other counts.
 
 use std::process;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{JoinHandle, sleep, spawn};
 use std::time::Duration;
 
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::State;
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, MeasuredMessage, Message, SetpointMessage};
+use hexad::messages::{MeasuredMessage, SetpointMessage};
 use serde_json::Value;
 
-use crate::support::children::{Ended, HANG, run};
+use crate::support::background::publish;
 use crate::support::machine::Machine;
 use crate::support::operator::{clear, does, engage, is_refused};
 use crate::support::peer::Controlled;
 use crate::support::recorder::Recorder;
-use crate::support::socket::status;
+use crate::support::socket::{pose, state, status};
 use crate::support::trio::{let_pass, start_daemon};
-use crate::support::turns;
 
 /// Longer than all timeouts of a patient machine.
 const SILENCE: Duration = Duration::from_millis(600);
-
-/// A thread of this process that publishes the same message every millisecond.
-struct Second {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Second {
-    fn start<T: Message + Send + Sync>(machine: &Machine, message: T) -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        let thread = {
-            let (stop, name) = (stop.clone(), machine.name.clone());
-            spawn(move || {
-                let bus = Bus::join(&name).expect("to join");
-                let mut publisher = bus.publisher::<T>().expect("to publish");
-                while !stop.load(Ordering::Relaxed) {
-                    publisher.publish(monotonic_ns(), message).expect("to send");
-                    sleep(Duration::from_millis(1));
-                }
-            })
-        };
-        Self { stop, thread: Some(thread) }
-    }
-}
-
-impl Drop for Second {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
-}
 
 /// Lengths of the platform at rest near home: as the plant has them, or so much longer \[m\].
 fn lengths_of(machine: &Machine, longer_m: f64) -> MeasuredMessage {
@@ -83,12 +47,12 @@ fn words(what: &str, used: u32, ignored: u32) -> [String; 2] {
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_second_driver_never_takes_over_and_control_does_not_begin_with_two() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("two-drivers");
     let recorder = Recorder::start(&machine.name);
     let Controlled { peer, daemon, plant, machine } = Controlled::start(machine);
-    let second = Second::start(&machine, lengths_of(&machine, 0.02));
+    let second = publish(&machine, lengths_of(&machine, 0.02));
     let [used, ignored] = words("measurements", plant.id(), process::id());
     daemon.says(&used);
     daemon.says(&ignored);
@@ -110,60 +74,57 @@ fn a_second_driver_never_takes_over_and_control_does_not_begin_with_two() {
     does(&machine, "stop", &[], &["standby"]);
 
     // The true one leaves: the other counts, though it was there all the time.
-    let second = Second::start(&machine, lengths_of(&machine, 0.0));
+    let second = publish(&machine, lengths_of(&machine, 0.0));
     let_pass(SILENCE);
-    plant.stops_on("TERM", HANG);
+    plant.stops();
     let_pass(SILENCE);
     let age_s = status(&machine)["status"]["sources"][1]["age_s"].as_f64().expect("an age");
     assert!(age_s < SILENCE.as_secs_f64() / 2.0, "nobody counts: {age_s}");
     assert_eq!(status(&machine)["diagnostic"]["code"], DiagnosticCode::ReadyToEngage as u32);
     drop((second, peer, recorder));
-    daemon.stops_on("TERM", HANG);
+    daemon.stops();
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_second_setpoint_source_never_takes_over_and_control_does_not_begin_with_two() {
-    let _turn = turns::beside_others();
     let Controlled { mut peer, daemon, plant, machine } = Controlled::start(Machine::patient("two-players"));
     let mut far = SetpointMessage { kind: 2, ..SetpointMessage::default() };
     far.x[3] = 1.15;
-    let second = Second::start(&machine, far);
+    let second = publish(&machine, far);
     let [used, _] = words("setpoints", peer.id(), process::id());
     daemon.says(&used);
     let_pass(SILENCE);
-    assert_eq!(status(&machine)["state"], "active");
+    assert_eq!(state(&machine), "active");
     // It is not followed under control even when the other has ended.
     peer.kill();
     daemon.says("stopping: setpoint lost in motion");
     daemon.says("fault: setpoint lost in motion");
-    let x = status(&machine)["status"]["pose"][3].as_f64().expect("a pose");
+    let x = pose(&machine)[3];
     assert!((x - 1.1).abs() < 0.01, "it was followed to {x}");
     clear(&machine);
     engage(&machine);
     does(&machine, "stop", &[], &["standby"]);
-    let third = Second::start(&machine, far);
+    let third = publish(&machine, far);
     let_pass(SILENCE);
     is_refused(&machine, "engage", &[], "two sources of setpoints");
     drop((second, third));
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
 }
 
 #[test]
+#[apply(beside_others)]
 fn a_plant_does_not_join_where_a_driver_lives() {
-    let _turn = turns::beside_others();
     let machine = Machine::patient("plant-beside");
     let daemon = start_daemon(&machine);
-    let driver = Second::start(&machine, MeasuredMessage::default());
-    let file = machine.file.display().to_string();
-    let Ended { status, stderr, .. } = run(&machine, &["plant", "--config", &file]);
-    assert_eq!(status.code(), Some(2), "{stderr}");
-    let words = format!("process {} (", process::id());
+    let driver = publish(&machine, MeasuredMessage::default());
     let end = format!(") already publishes measurements of {}: end it first", machine.name);
-    assert!(stderr.contains(&words) && stderr.contains(&end), "{stderr}");
+    let stderr = machine.hexad::<&str>("plant", &[]).fails(2, &end);
+    assert!(stderr.contains(&format!("process {} (", process::id())), "{stderr}");
     drop(driver);
     let plant = crate::support::trio::start_plant(&machine);
     plant.says("plant at rest at home");
-    plant.stops_on("TERM", HANG);
-    daemon.stops_on("TERM", HANG);
+    plant.stops();
+    daemon.stops();
 }

@@ -10,12 +10,10 @@ use std::{env, fs};
 use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
 
-use crate::support::children::{HANG, Hexad, hexad, run};
+use crate::support::children::{Hexad, hexad};
 use crate::support::machine::{Machine, patient};
-use crate::support::recorder::Recorder;
-use crate::support::socket::status;
-use crate::support::trio::{let_pass, start_daemon, start_plant};
-use crate::support::turns;
+use crate::support::socket::{pose, state, status};
+use crate::support::trio::{Trio, let_pass, start_daemon};
 
 const GUIDE: &str = include_str!("../../docs/motion_simulator.md");
 
@@ -78,8 +76,7 @@ struct Ride {
 fn ride() -> Ride {
     let machine = Machine::with("udp", block(1));
     fs::write(&machine.file, patient(&fs::read_to_string(&machine.file).unwrap())).unwrap();
-    let recorder = Recorder::start(&machine.name);
-    let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+    let Trio { daemon, plant, recorder, machine, .. } = Trio::standing(machine);
     fs::write(machine.path("game.toml"), block(2)).unwrap();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     // A free port, which the player binds next.
@@ -94,9 +91,8 @@ fn ride() -> Ride {
     player.says("waits for datagrams");
     let (began, began_ns) = (Instant::now(), monotonic_ns());
     let pose = |when: &str| -> [f64; 6] {
-        let answer = status(&machine);
-        assert_eq!(answer["state"], "active", "{when}: {answer}");
-        std::array::from_fn(|k| answer["status"]["pose"][k].as_f64().unwrap_or(f64::NAN))
+        assert_eq!(state(&machine), "active", "{when}");
+        pose(&machine)
     };
     send(&socket, &to, began, 1.0, false);
     player.says("follows the stream");
@@ -109,14 +105,17 @@ fn ride() -> Ride {
     let second = send(&socket, &to, began, 5.5, false);
     send(&socket, &to, began, 2.0, true);
     player.signal("INT");
-    let ended = player.ends_within(HANG);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    assert!(ended.stderr.contains("it has not the numbers of --format"), "{}", ended.stderr);
+    let ended = player.ends();
+    assert!(
+        ended.status.success() && ended.stderr.contains("it has not the numbers of --format"),
+        "{}",
+        ended.stderr
+    );
     let boarded = pose("at the end");
     assert!((boarded[3] - 1.08).abs() < 1e-3 && boarded[4].abs() < 1e-3, "{boarded:?}");
-    let said = daemon.stops_on("TERM", HANG).stderr;
+    let said = daemon.stops();
     assert!(!said.contains("fault") && said.matches("active:").count() == 1, "{said}");
-    plant.stops_on("TERM", HANG);
+    plant.stops();
 
     let measured = recorder.finish().measured;
     // The jumps are taken at the limit, and no faster.
@@ -145,49 +144,19 @@ fn fastest(measured: &[MeasuredMessage]) -> f64 {
 
 /// A busy host holds up sender or player for longer than a pause: then the flight is another one, and is repeated.
 #[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
 fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
-    let _turn = turns::beside_others();
     let undisturbed = (0..3).map(|_| ride()).find(|ride| ride.pauses == 1);
     let ride = undisturbed.expect("three rides with a single pause in none of them");
     assert!(ride.deviation_m < 4e-3, "{} m", ride.deviation_m);
 }
 
-#[test]
-fn an_open_address_a_wrong_format_and_an_unfit_file_are_refused() {
-    let _turn = turns::beside_others();
-    let fit = Machine::with("udp-refused", block(1));
-    let unfit = Machine::with("udp-stop", "");
-    let refused = |machine: &Machine, more: &[&str], words: &str| {
-        let file = machine.file.display().to_string();
-        let ended = run(machine, &[&["move", "--config", &file], more].concat());
-        assert_eq!(ended.status.code(), Some(2), "{more:?}: {}", ended.stderr);
-        assert!(ended.stderr.contains(words), "{words:?} must be in {}", ended.stderr);
-    };
-    refused(
-        &unfit,
-        &["--udp", "127.0.0.1:4123", "--format", "simtools"],
-        "setpoint.on_violation = \"limit\"",
-    );
-    refused(&fit, &["--udp", "127.0.0.1:4123"], "needs --format");
-    refused(&fit, &["--udp", "127.0.0.1:4123", "--tool", "tip"], "must go with --trajectory");
-    refused(
-        &fit,
-        &["--udp", "127.0.0.1:4123", "--format", "none"],
-        "no such file; the formats with a name are",
-    );
-    refused(&fit, &["--udp", "0.0.0.0:4123", "--format", "simtools"], "must be the address of one interface");
-    refused(&fit, &["--udp", "192.0.2.1:4123", "--format", "simtools"], "with --from");
-    refused(
-        &fit,
-        &["--udp", "127.0.0.1:4123", "--format", "simtools", "--boarding", "0,0,0,9m,0,0"],
-        "workspace",
-    );
-}
-
 /// A button that is pressed, and one that is unplugged.
 #[test]
+#[ignore = "second tier: needs Python"]
+#[apply(beside_others)]
 fn a_usb_button_is_an_emergency_stop() {
-    let _turn = turns::beside_others();
     for is_pressed in [true, false] {
         let machine = Machine::patient("button");
         let daemon = start_daemon(&machine);
@@ -218,6 +187,6 @@ fn a_usb_button_is_an_emergency_stop() {
             (&"fault".into(), &110.into()),
             "{answer}"
         );
-        daemon.stops_on("TERM", HANG);
+        daemon.stops();
     }
 }

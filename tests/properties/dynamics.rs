@@ -1,17 +1,8 @@
 //! Identities of the inverse dynamics of one machine.
 
-use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
-use hexad::model::fidelity::{Exact, RigidLegs};
-use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::transmission::Transmission;
-use nalgebra::{Vector3, Vector6};
-use proptest::prelude::*;
 
-use super::common::Legs;
-use super::{cases, machine_in_motion, relative, vector6};
+use super::*;
 
 fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
     inverse_dynamics::<Exact>(machine, motion).unwrap().into()
@@ -112,28 +103,10 @@ proptest! {
             prop_assert!(most <= actuator.max_force * (1.0 + 1e-12));
         }
     }
-
-    /// Each drive adds its own force and nothing to its neighbours.
-    #[test]
-    fn drives_add_their_force((machine, _, motion) in machine_in_motion()) {
-        let mut ideal = machine.clone();
-        ideal.actuator.reflected_mass = 0.0;
-        (ideal.actuator.viscous_friction, ideal.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
-        let legs = leg_motion(&machine, &motion);
-        let (with, without) = (forces(&machine, &motion), forces(&ideal, &motion));
-        let actuator = &machine.actuator;
-        for i in 0..6 {
-            let smooth = (legs.rate[i] / actuator.coulomb_smoothing).clamp(-1.0, 1.0);
-            let drive = actuator.reflected_mass * legs.accel[i]
-                + actuator.viscous_friction[i] * legs.rate[i]
-                + actuator.coulomb_friction[i] * smooth;
-            prop_assert!((with[i] - without[i] - drive).abs() < 1e-12 * with.amax().max(without.amax()));
-        }
-    }
 }
 
 /// Potential of all thirteen bodies.
-fn potential(machine: &Machine, pose: &hexad::model::rigid::Pose) -> f64 {
+fn potential(machine: &Machine, pose: &Pose) -> f64 {
     let height = |mass: f64, at: &Vector3<f64>| -mass * machine.gravity.dot(at);
     let Legs { base, platform, .. } = Legs::of(machine);
     let body = &machine.platform;

@@ -1,20 +1,12 @@
 //! Frames: round trips, derivatives, and what stays where it is while a tool turns.
 
-use hexad::model::random::Random;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::task::TaskState;
-use hexad::motion::frames::Frames;
-use nalgebra::{Vector3, Vector6};
+use super::*;
 
 /// Poses and twists of each round trip.
 const CASES: u32 = 100_000;
 
 /// A machine of a metre. Errors are in shares of the lengths that are added up.
 const SIZE_M: f64 = 1.0;
-
-fn vector(random: &mut Random) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| random.signed())
-}
 
 fn pose(random: &mut Random) -> Pose {
     let (angles, place) = (vector(random) * 3.1, vector(random) * SIZE_M);
@@ -61,7 +53,6 @@ fn there_and_back_is_exact_to_rounding() {
             worst = core::array::from_fn(|k| worst[k].max(found[k]));
         }
     }
-    println!("{worst:?}");
     assert!(worst.iter().all(|worst| *worst < 1e-15), "{worst:?}");
 }
 

@@ -1,20 +1,8 @@
 //! What the forces must not depend on: the choice of axes, of units, of leg numbers, of instructions.
 
 use fearless_simd::Level;
-use hexad::model::LEGS;
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::{Exact, LumpedLegs, MasslessLegs, NoVelocity, RigidLegs};
-use hexad::model::forward_kinematics::refine;
-use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::inverse_jacobian::condition;
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::{Link, Machine};
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use nalgebra::{Matrix3, Vector3};
-use proptest::prelude::*;
 
-use super::common::Legs;
-use super::{cases, machine_in_motion, relative, rotation, vector3};
+use super::*;
 
 fn forces(machine: &Machine, motion: &Motion) -> [f64; LEGS] {
     inverse_dynamics::<Exact>(machine, motion).unwrap()
@@ -53,19 +41,8 @@ fn moved_platform(
     result.joints = Legs { platform: legs.platform.map(of_new), ..legs }.joints(&result.home);
     result.platform.center_of_mass = of_new(machine.platform.center_of_mass);
     result.platform.inertia = q.transpose() * machine.platform.inertia * q;
-    let Motion { pose, twist, acceleration } = motion;
-    let arm = pose.rotation * d;
-    let motion = Motion {
-        pose: Pose { rotation: pose.rotation * q, position: pose.position + arm },
-        twist: Twist { angular: twist.angular, linear: twist.linear + twist.angular.cross(&arm) },
-        acceleration: Acceleration {
-            angular: acceleration.angular,
-            linear: acceleration.linear
-                + acceleration.angular.cross(&arm)
-                + twist.angular.cross(&twist.angular.cross(&arm)),
-        },
-    };
-    (result, motion)
+    let tool = Pose { rotation: *q, position: *d };
+    (result, Frames { tool, ..Frames::default() }.tool_motion(motion))
 }
 
 /// Lengths times `s`, masses times `m`, times times `t`: forces are `m s / t^2` as large.

@@ -1,16 +1,6 @@
 //! Lengths, rates and accelerations of the legs, and the way back to pose and twist.
 
-use hexad::model::forward_kinematics::{Outcome, Tracker, TrackingResult, refine};
-use hexad::model::inverse_geometry::{leg_directions, leg_lengths, leg_motion};
-use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::rigid::{Motion, Twist};
-use hexad::model::task::TaskState;
-use nalgebra::Vector6;
-use proptest::prelude::*;
-
-use super::common::{Legs, angle_between, largest};
-use super::{cases, machine_in_motion, vector6};
+use super::*;
 
 /// Step of the differences \[s\]: truncation and rounding meet near 1e-9 of the scale of the motion.
 const STEP: f64 = 1e-4;
@@ -102,7 +92,7 @@ proptest! {
     #[test]
     fn forward_kinematics_inverts_inverse((machine, _, motion) in machine_in_motion()) {
         let lengths = leg_lengths(&machine, &motion.pose);
-        let home = TaskState::at_rest(machine.home).motion().pose;
+        let home = machine.home_pose();
         let mut tracker = Tracker::new(&machine, home);
         prop_assert_eq!(tracker.find(&machine, &lengths).0, TrackingResult::Found);
         let bound = 1e-14 * condition(&machine, &motion.pose) * largest(&lengths).max(1.0);

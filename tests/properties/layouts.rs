@@ -1,19 +1,7 @@
 //! Sound machines whose legs are arranged so that methods which work on some of the legs first may fail:
 //! parallel legs, legs in a plane.
 
-use hexad::model::LEGS;
-use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
-use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::{Tracker, TrackingResult};
-use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
-use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
-use hexad::model::machine::Machine;
-use hexad::model::task::TaskState;
-use nalgebra::{Vector3, Vector6};
-use proptest::prelude::*;
-
-use super::common::{Legs, angle_between, machine};
-use super::{cases, relative, state_near_home, vector6};
+use super::*;
 
 /// Three legs straight up, two along x, one along y: any three of a kind lie in a plane at home, yet the six
 /// determine everything. `order` says which leg gets which number.
@@ -60,7 +48,7 @@ proptest! {
         let twist = twist_from_rates(&machine, &motion.pose, &rates).unwrap().vector();
         prop_assert!((twist - motion.twist.vector()).amax() < 1e-11);
 
-        let home = TaskState::at_rest(machine.home).motion().pose;
+        let home = machine.home_pose();
         let mut found = Tracker::new(&machine, home);
         let (tracked, _) = found.find(&machine, &leg_lengths(&machine, &motion.pose));
         prop_assert_eq!(tracked, TrackingResult::Found);

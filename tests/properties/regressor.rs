@@ -1,18 +1,11 @@
 //! The regressor form: exact, linear, and blind in the directions it names.
 
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::machine::Machine;
 use hexad::model::regressor::{
     COULOMB, INDISTINGUISHABLE_PAIRS, InertialParameters, PARAMETER_COUNT, REFLECTED, Regressor, VISCOUS,
     inertial_parameters, regressor, rod_mass_null_direction,
 };
-use hexad::model::rigid::Motion;
-use nalgebra::{DMatrix, Matrix3, Vector3, Vector6};
-use proptest::prelude::*;
 
-use super::common::{Errors, MACHINES, machine, motions};
-use super::{any_machine, cases, machine_in_motion, state_near_home, vector3, vector6};
+use super::*;
 
 fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
     inverse_dynamics::<Exact>(machine, motion).unwrap().into()
@@ -21,21 +14,6 @@ fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
 /// `|Y| |p|`: what is summed up to a force, hence what rounding is a share of.
 fn summed(y: &Regressor, p: &InertialParameters) -> f64 {
     (y.abs() * p.abs()).amax()
-}
-
-#[test]
-fn the_regressor_gives_the_forces_of_the_vectors() {
-    for name in MACHINES {
-        let machine = machine(name);
-        let p = inertial_parameters(&machine);
-        let mut errors = Errors::default();
-        for motion in motions(name) {
-            let expected = forces(&machine, &motion);
-            let found = regressor(&machine, &motion).unwrap() * p;
-            errors.add((found - expected).amax() / expected.amax());
-        }
-        errors.assert_within(1e-12, &format!("{name} regressor"));
-    }
 }
 
 /// The machine that has these parameters, on the geometry of another.

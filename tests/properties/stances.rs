@@ -1,16 +1,6 @@
 //! What a kinematic_state keeps is what would be computed anew.
 
-use hexad::model::forward_kinematics::{Outcome, refine};
-use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
-use hexad::model::inverse_jacobian::{condition, leg_wrenches, scaled_wrenches, twist_from_rates};
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Motion, Pose, Twist, exp};
-use nalgebra::{Vector3, Vector6};
-use proptest::prelude::*;
-
-use super::common::Legs;
-use super::{cases, machine_in_motion, relative, vector6};
+use super::*;
 
 /// A kinematic_state that forward kinematics moved to the motion's pose.
 fn arrived(machine: &Machine, motion: &Motion, from: &Vector6<f64>) -> KinematicState {

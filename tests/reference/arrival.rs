@@ -11,8 +11,8 @@ use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};
 use rsruckig::prelude::*;
 
-use super::common::data;
-use super::common::rig::parameters;
+use hexad_support::data;
+use hexad_support::rig::parameters;
 
 /// Part of the way that is left on arrival.
 pub const ARRIVED: f64 = 0.01;

@@ -11,8 +11,8 @@ use hexad::control::signals::inputs::Setpoint;
 use hexad::model::rigid::Pose;
 use hexad::model::task::TaskState;
 
-use super::common::data;
-use super::common::rig::parameters;
+use hexad_support::data;
+use hexad_support::rig::parameters;
 
 const SECONDS: u64 = 2;
 /// Instants at which the motions are compared \[1/s\]: those of the slowest loop.

@@ -1,21 +1,8 @@
 //! Poses beyond a singular one have the lengths of poses before it. A platform that got there, whoever carried it,
 //! is not taken for one that is still on the side of home: not until somebody has looked and said so.
 
-use hexad::control::controller::Output;
-use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::signals::limits::Limit;
-use hexad::control::signals::state::{Request, State};
-use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::rigid::{Pose, Wrench};
-use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::{Profile, rise};
-use hexad::plant::imperfections::{ExternalWrench, Imperfections};
-use hexad::plant::simulator::Simulator;
-use nalgebra::Vector3;
-
-use super::common::largest;
-use super::common::rig::Rig;
-use super::fichter::{ANY, AT_HOME, CONDITION, at, before, motion_base, on_the_way};
+use super::fichter::{ANY, AT_HOME, CONDITION, at, before, motion_base, on_the_way, reason, there_and_back};
+use super::*;
 
 /// From home to as far beyond \[s\]: peak speeds from 2.3 to 0.028 rad/s.
 const TIMES_S: [f64; 4] = [0.5, 2.0, 10.0, 40.0];
@@ -25,19 +12,12 @@ const LOOK: u32 = 300;
 
 /// One cycle of a platform that is where the task says, whatever the forces.
 fn carried(rig: &mut Rig, task: &TaskState) -> Output {
-    let legs = leg_motion(rig.simulator.machine(), &task.motion());
+    let legs = leg_motion(rig.simulator().machine(), &task.motion());
     let mut input = rig.input(task);
     let measurement = input.measurement.as_mut().unwrap();
     (measurement.length, measurement.rate) = (legs.length, Some(legs.rate));
-    rig.now_ns += rig.period_ns;
+    rig.now_ns += rig.parameters.period_ns;
     rig.controller.step(&input)
-}
-
-/// The way there, and back.
-fn there_and_back(t: f64, time_s: f64) -> TaskState {
-    let (up, down) = (rise(t, time_s), rise(t - 2.0 * time_s, time_s));
-    let s = Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel };
-    on_the_way(-AT_HOME, &s)
 }
 
 fn pose_error(output: &Output, truth: &Pose) -> f64 {
@@ -62,7 +42,7 @@ fn a_platform_that_passed_a_singular_pose_is_not_known_until_it_is_cleared() {
             let cycles = (3.0 * time_s * 1e3) as u32;
             let mut crossed = false;
             for k in 0..cycles {
-                let task = there_and_back(f64::from(k) * 1e-3, time_s);
+                let task = there_and_back(f64::from(k) * 1e-3, time_s, -AT_HOME, 2.0 * time_s);
                 let output = carried(&mut rig, &task);
                 let truth = task.motion().pose;
                 crossed |= !before(&config.machine, &truth);
@@ -86,11 +66,7 @@ fn a_platform_that_passed_a_singular_pose_is_not_known_until_it_is_cleared() {
             }
             rig.ask(Request::Clear);
             let output = (0..3).map(|_| carried(&mut rig, &home)).last().unwrap();
-            assert_eq!(
-                (output.state, output.diagnostic.code),
-                (State::Standby, DiagnosticCode::ReadyToEngage),
-                "{what}"
-            );
+            assert_eq!(reason(&output), (State::Standby, DiagnosticCode::ReadyToEngage), "{what}");
             assert!(pose_error(&output, &home.motion().pose) < 1e-9, "{what}");
         }
     }
@@ -113,28 +89,19 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             let mut rig = Rig::new(&config, &config.machine);
             let home = on_the_way(AT_HOME, &Profile::default());
             rig.engage(&home);
-            let plant = &config.deployment.plant;
             let external = ExternalWrench { wrench, frequency_hz: 0.0 };
-            rig.simulator = Simulator::imperfect(
-                &config.machine,
-                plant.brake_deceleration_m_s2,
-                plant.step_s,
-                plant.tolerance_m,
-                &Imperfections { external, ..Imperfections::default() },
-            );
+            let pushed = Imperfections { external, ..Imperfections::default() };
+            rig.put(Rig::imperfect(&config, &config.machine, &pushed).hardware);
             let (mut limited, mut last) = (0, Output::default());
             for _ in 0..3000 {
                 last = rig.cycle(&rig.input(&home));
                 assert!(largest(&last.force) <= 20e3);
-                assert!(!last.state.has_control() || before(&config.machine, &rig.simulator.state().pose));
+                assert!(!last.state.has_control() || before(&config.machine, &rig.simulator().state().pose));
                 limited += u32::from(last.active_limits.contains(Limit::Force));
             }
             // The torque is more than the drives have, or more than a disturbance may be.
             let is_implausible = last.diagnostic.code == DiagnosticCode::MeasurementImplausible;
-            assert!(
-                (limited > 10 || is_implausible) && last.state == State::Fault,
-                "{torque} {condition}: {last:?}"
-            );
+            assert!((limited > 10 || is_implausible) && last.state == State::Fault, "{torque}: {last:?}");
         }
     }
 }
@@ -158,10 +125,8 @@ fn the_time_to_a_singular_pose_is_told() {
             let ratio = platform.time_to_singularity * speed / distance;
             // The determinant is as good as linear at last, and taken from one measurement to the next.
             let near = (ratio - 1.0).abs() < 4.0 * distance + 1e-3 * speed / distance;
-            assert!(
-                if speed > 0.0 { near } else { platform.time_to_singularity == f64::INFINITY },
-                "{speed} {distance}: {ratio}"
-            );
+            let is_right = if speed > 0.0 { near } else { platform.time_to_singularity == f64::INFINITY };
+            assert!(is_right, "{speed} {distance}: {ratio}");
             assert!(
                 (platform.condition * distance / CONDITION - 1.0).abs() < 2.0 * distance * distance + 1e-3
             );
@@ -185,7 +150,7 @@ fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
     let after = |way: f64| {
         let mut rig = Rig::new(&config, &config.machine);
         rig.engage(&home);
-        rig.now_ns += u64::from(PAUSE - 1) * rig.period_ns;
+        rig.now_ns += u64::from(PAUSE - 1) * rig.parameters.period_ns;
         let mut task = home;
         task.x[5] += way;
         task.xd[5] = 2.0 * way / (f64::from(PAUSE) * 1e-3);
@@ -203,11 +168,7 @@ fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
             continue;
         }
         out_of_steps += 1;
-        assert_eq!(
-            (output.state, output.diagnostic.code),
-            (State::Fault, DiagnosticCode::MeasurementJumped),
-            "{k}"
-        );
+        assert_eq!(reason(&output), (State::Fault, DiagnosticCode::MeasurementJumped), "{k}");
         let Diagnostic { value, bound, .. } = output.diagnostic;
         assert!((value - largest(&ways)).abs() < 1e-12, "{k}: {output:?}");
         // A way that was found is within the bound; what is told of is beyond.

@@ -2,22 +2,12 @@
 //!
 //! `distance` is the angle that is left to that pose; beyond it, it is negative.
 
-use core::f64::consts::FRAC_PI_2;
-
-use hexad::config::Config;
-use hexad::control::signals::limits::{DerivativeLimits, Limits};
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::Pose;
-use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::Profile;
-
-use super::common::{Legs, deployed};
+use super::*;
 
 /// Of home: the condition is 10.8 there.
 pub const AT_HOME: f64 = 0.3;
 
-/// Times the distance, where that is small: the condition.
+/// Times the distance, where that is small: the condition, as `passing.rs` shows.
 pub const CONDITION: f64 = 3.237;
 
 /// Times the distance, where that is small: the largest of the forces that hold the platform \[N\].
@@ -47,6 +37,18 @@ pub fn at(distance: f64) -> TaskState {
     TaskState::at_rest([0.0, 0.0, FRAC_PI_2 - distance, 0.0, 0.0, 1.25])
 }
 
+/// How the last cycle ended.
+pub fn reason(output: &Output) -> (State, DiagnosticCode) {
+    (output.state, output.diagnostic.code)
+}
+
+/// From home to a distance in a time, and back from an instant on.
+pub fn there_and_back(t: f64, time_s: f64, distance: f64, back_s: f64) -> TaskState {
+    let (up, down) = (rise(t, time_s), rise(t - back_s, time_s));
+    let s = Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel };
+    on_the_way(distance, &s)
+}
+
 /// From home to a distance, along a profile from 0 to 1.
 pub fn on_the_way(distance: f64, s: &Profile) -> TaskState {
     let way = AT_HOME - distance;
@@ -59,22 +61,4 @@ pub fn on_the_way(distance: f64, s: &Profile) -> TaskState {
 pub fn before(machine: &Machine, pose: &Pose) -> bool {
     let side = |pose: &Pose| KinematicState::new(machine, *pose).sensitivity().determinant;
     side(pose) * side(&at(AT_HOME).motion().pose) > 0.0
-}
-
-/// The two numbers above are what the model says.
-#[test]
-fn condition_and_forces_grow_with_the_inverse_distance() {
-    let config = motion_base(ANY);
-    for power in 3..=8 {
-        let distance = 10_f64.powi(-power);
-        let motion = at(distance).motion();
-        let condition = KinematicState::new(&config.machine, motion.pose).sensitivity().condition;
-        assert!((condition * distance / CONDITION - 1.0).abs() < 1e-3, "{}", condition * distance);
-        let forces = hexad::model::active_forces::inverse_dynamics::<hexad::model::fidelity::Exact>(
-            &config.machine,
-            &motion,
-        );
-        let largest = super::common::largest(&forces.unwrap());
-        assert!((largest * distance / HOLDING_N - 1.0).abs() < 2e-3, "{}", largest * distance);
-    }
 }

@@ -1,20 +1,7 @@
 //! Gimbal lock of the Bryan angles at speed: the same motion of the same machine, once as it stands and once turned
 //! by 90 degrees about y with everything around it, so that beta passes 90 degrees. The forces cannot tell.
 
-use core::f64::consts::FRAC_PI_2;
-
-use hexad::config::Config;
-use hexad::control::controller::Output;
-use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::limits::DerivativeLimits;
-use hexad::control::signals::state::State;
-use hexad::model::rigid::{Motion, Pose};
-use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::rise;
-use nalgebra::{Matrix3, Vector3, Vector6};
-
-use super::common::rig::Rig;
-use super::common::{Legs, deployed, largest};
+use super::*;
 
 /// The platform turns so far to either side of the lock \[rad\].
 const TURN: f64 = 0.15;
@@ -118,11 +105,7 @@ fn forces(time_s: f64, d: f64) -> [Vec<[f64; 6]>; 2] {
         let cycle = |k: u32| {
             let task = tasks(f64::from(k) * 1e-3, time_s, d, height)[which];
             let Output { state, diagnostic, force, .. } = rig.cycle(&rig.input(&task));
-            assert_eq!(
-                (state, diagnostic.code),
-                (State::Active, DiagnosticCode::None),
-                "{d} rad, cycle {k}: {diagnostic:?}"
-            );
+            assert_eq!((state, diagnostic.code), (State::Active, DiagnosticCode::None), "{d} rad, cycle {k}");
             force
         };
         (0..(time_s * 1e3) as u32 + 300).map(cycle).collect()
@@ -150,28 +133,7 @@ fn gimbal_lock_is_passed_without_a_trace_in_the_forces() {
             let apart = plain.iter().zip(&turned).map(apart).fold(0.0, f64::max);
             let speed = 1.875 * 2.0 * TURN / time_s;
             let bound = ROUNDING + SHARE * rounding_of_messages(speed, d);
-            println!("{time_s} s, {d:e} rad beside: {:.1e} of {most:.0} N, bound {bound:.1e}", apart / most);
             assert!(apart / most < bound, "{time_s} s, {d:e} rad beside: {apart} N of {most} N");
         }
     }
-}
-
-/// What the test above compares is one motion.
-#[test]
-fn the_two_machines_move_alike() {
-    let apart = |a: Vector3<f64>, b: Vector3<f64>| (quarter() * a - b).norm();
-    for d in BESIDE {
-        for k in 0..=300 {
-            let [plain, turned] = tasks(f64::from(k) * 1e-3, 0.3, d, 1.25).map(|task| task.motion());
-            let Motion { pose: Pose { rotation, position }, twist, acceleration } = plain;
-            assert!((quarter() * rotation - turned.pose.rotation).amax() < 1e-15, "{d} {k}");
-            assert!(apart(position, turned.pose.position) < 1e-15);
-            let rounding = 8.0 * rounding_of_messages(2.0, d);
-            assert!(apart(twist.angular, turned.twist.angular) < 1e-14 + 1e-15 / d.max(1e-9), "{d} {k}");
-            let parts = apart(acceleration.angular, turned.acceleration.angular);
-            assert!(parts < 1e-13 + rounding, "{d} {k}: {parts}");
-        }
-    }
-    let [_, lock] = tasks(0.15, 0.3, 0.0, 1.25);
-    assert!((lock.x[1] - FRAC_PI_2).abs() < 1e-15 && lock.xd[1] > 1.8);
 }

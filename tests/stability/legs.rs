@@ -1,35 +1,15 @@
 //! Legs at their worst: through the axis of their universal joint, next to no length, next to parallel.
 
-use core::f64::consts::TAU;
-
-use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::limits::Limit;
-use hexad::control::signals::state::State;
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::{Exact, Fidelity, MasslessLegs, RigidLegs};
-use hexad::model::forward_kinematics::{MAX_CONDITION, Outcome, refine};
-use hexad::model::inverse_geometry::{leg_directions, leg_lengths};
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::task::TaskState;
-use nalgebra::{Vector3, Vector6};
 
-use super::common::rig::Rig;
-use super::common::{Legs, deployed, largest};
-
-fn home(machine: &Machine) -> Pose {
-    TaskState::at_rest(machine.home).motion().pose
-}
+use super::*;
 
 /// The motion base with the universal joint of its first leg turned so that the leg passes its first axis at this
 /// angle when the platform moves along the vector, which is normal to the leg.
 fn through_axis(beside: f64) -> (Config, Vector3<f64>) {
     let mut config = deployed("motion_base");
     let machine = &mut config.machine;
-    let n = leg_directions(machine, &home(machine))[0];
+    let n = leg_directions(machine, &machine.home_pose())[0];
     let along = n.cross(&Vector3::z()).normalize();
     let mut legs = Legs::of(machine);
     legs.universal_axis[0] = n * beside.cos() + n.cross(&along) * beside.sin();
@@ -44,8 +24,8 @@ fn spin_at_most(beside: f64) -> f64 {
     let machine = &config.machine;
     let dynamics = InverseDynamics::new(machine);
     let at = |share: f64| {
-        let mut pose = home(machine);
-        pose.position += along * (share * beside * leg_lengths(machine, &home(machine))[0]);
+        let mut pose = machine.home_pose();
+        pose.position += along * (share * beside * leg_lengths(machine, &machine.home_pose())[0]);
         let twist = Twist { angular: Vector3::zeros(), linear: along * SPEED };
         let motion = Motion { pose, twist, acceleration: Acceleration::default() };
         let spin =
@@ -64,18 +44,16 @@ const SPEED: f64 = 0.3;
 #[test]
 fn beside_the_axis_of_its_joint_a_leg_spins_as_predicted() {
     let machine = deployed("motion_base").machine;
-    let length = leg_lengths(&machine, &home(&machine))[0];
+    let length = leg_lengths(&machine, &machine.home_pose())[0];
     let inertia = machine.cylinder.axial_inertia + machine.rod.axial_inertia;
     let predicted = |e: f64| 0.572_433 * inertia * (SPEED / length).powi(2) / (e.powi(3) * length);
     for beside in [1e-2, 1e-3, 1e-4, 1e-5] {
         let ratio = spin_at_most(beside) / predicted(beside);
-        println!("{beside:e}: {:.3e} N, {ratio:.6}", predicted(beside));
         assert!((ratio - 1.0).abs() < 3.0 * beside + 1e-3, "{beside:e}: {ratio}");
     }
     // Nearer than the model looks, and through it.
     for beside in [1e-7, 1e-9, 0.0] {
         let most = spin_at_most(beside);
-        println!("{beside:e}: {most:.3e} N");
         assert!(most < predicted(1e-6), "{beside:e}: {most} N");
     }
 }
@@ -115,11 +93,7 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
                 break;
             }
             if output.state != State::Active {
-                assert_eq!(
-                    output.diagnostic.code,
-                    DiagnosticCode::SetpointBeyondLimits,
-                    "{fidelity:?} {beside:e}"
-                );
+                assert_eq!(output.diagnostic.code, DiagnosticCode::SetpointBeyondLimits, "{beside:e}");
                 has_stopped = true;
             }
             cut += u32::from(
@@ -128,7 +102,6 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
             );
             most = most.max(largest(&output.force));
         }
-        println!("{fidelity:?} {beside:e}: {cut} cycles cut, {most:.0} N, stopped {has_stopped}");
         assert!(most <= config.machine.actuator.max_force);
         assert_eq!([cut > 0, has_stopped], [beside < 1e-2; 2], "{fidelity:?} {beside:e}: {cut} cycles");
     }
@@ -137,7 +110,7 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
 /// The motion base with the first joint on its base so near to that on the platform at home.
 fn with_short_leg(length: f64) -> Machine {
     let mut machine = deployed("motion_base").machine;
-    let at_home = home(&machine);
+    let at_home = machine.home_pose();
     let n = leg_directions(&machine, &at_home)[0];
     let mut legs = Legs::of(&machine);
     legs.base[0] = at_home.position + at_home.rotation * legs.platform[0] - n * length;
@@ -152,7 +125,7 @@ fn with_short_leg(length: f64) -> Machine {
 fn a_leg_of_next_to_no_length_loses_what_its_length_says() {
     let trusted = |length: f64| {
         let machine = with_short_leg(length);
-        KinematicState::new(&machine, home(&machine)).sensitivity().trusted_step / length
+        KinematicState::new(&machine, machine.home_pose()).sensitivity().trusted_step / length
     };
     let forces = |length: f64| {
         let machine = with_short_leg(length);
@@ -168,14 +141,13 @@ fn a_leg_of_next_to_no_length_loses_what_its_length_says() {
         assert!((trusted(length) / small - 1.0).abs() < 0.01, "{length:e}: {} {small}", trusted(length));
         let now = forces(length);
         let bound = 2.0 * f64::EPSILON / length;
-        println!("{length:e}: {:.1e} of {bound:.1e}", apart(&now.0, &massless));
         assert!(apart(&now.0, &massless) < bound, "{length:e}");
         assert!((largest(&now.1) * length / heavy - 1.0).abs() < 0.05 + 100.0 * length, "{length:e}");
         // A step of what is trusted is found, one of the length of the leg is refused.
         let machine = with_short_leg(length);
-        let start = KinematicState::new(&machine, home(&machine));
+        let start = KinematicState::new(&machine, machine.home_pose());
         for (share, outcome) in [(0.5, Outcome::Solved), (1.0 / small, Outcome::LeftTrustedRegion)] {
-            let mut there = home(&machine);
+            let mut there = machine.home_pose();
             there.position.x += share * trusted(length) * length * machine.joints.radius;
             let mut kinematic_state = start;
             let report = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there));
@@ -200,18 +172,17 @@ fn nearly_parallel(angle: f64) -> Machine {
 fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
     let condition = |angle: f64| {
         let machine = nearly_parallel(angle);
-        KinematicState::new(&machine, home(&machine)).sensitivity().condition * angle
+        KinematicState::new(&machine, machine.home_pose()).sensitivity().condition * angle
     };
     let small = condition(1e-4);
     for power in 2..=7 {
         let angle = 10_f64.powi(-power);
         let ratio = condition(angle) / small;
-        println!("{angle:e}: condition {:.3e}", condition(angle) / angle);
         assert!((ratio - 1.0).abs() < 0.02, "{angle:e}: {ratio}");
         let machine = nearly_parallel(angle);
-        let mut kinematic_state = KinematicState::new(&machine, home(&machine));
+        let mut kinematic_state = KinematicState::new(&machine, machine.home_pose());
         let step = 0.5 * kinematic_state.sensitivity().trusted_step * machine.joints.radius;
-        let mut there = home(&machine);
+        let mut there = machine.home_pose();
         there.position.z += step;
         let outcome = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there)).outcome;
         let expected = if small / angle < MAX_CONDITION { Outcome::Solved } else { Outcome::NearSingular };

@@ -2,26 +2,13 @@
 //!
 //! The platform turns from home toward the singular pose, to a distance from it, and back.
 
-use hexad::config::Config;
-use hexad::control::controller::Output;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::signals::limits::Limit;
-use hexad::control::signals::state::State;
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::MAX_CONDITION;
-use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::rigid::{Motion, Wrench};
-use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::{Profile, rise};
-use nalgebra::Vector6;
 use rayon::prelude::*;
 
-use super::common::largest;
-use super::common::rig::Rig;
-use super::fichter::{ANY, AT_HOME, CONDITION, HOLDING_N, at, before, motion_base, on_the_way};
+use super::fichter::{
+    ANY, AT_HOME, CONDITION, HOLDING_N, at, before, motion_base, on_the_way, reason, there_and_back,
+};
+use super::*;
 
 /// From home to the nearest pose \[s\]: up to 0.14, 0.38 and 0.94 rad/s.
 const TIMES_S: [f64; 3] = [4.0, 1.5, 0.6];
@@ -43,12 +30,6 @@ struct Run {
     cycles: u32,
 }
 
-fn there_and_back(t: f64, time_s: f64, distance: f64) -> TaskState {
-    let (up, down) = (rise(t, time_s), rise(t - time_s, time_s));
-    let s = Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel };
-    on_the_way(distance, &s)
-}
-
 /// Follows the motion as long as it is controlled, or to its end; never beyond the singular pose.
 fn run(config: &Config, time_s: f64, distance: f64) -> Run {
     let machine = &config.machine;
@@ -64,9 +45,9 @@ fn run(config: &Config, time_s: f64, distance: f64) -> Run {
         cycles: 0,
     };
     while f64::from(run.cycles) < 2e3 * time_s {
-        let task = there_and_back(f64::from(run.cycles) * 1e-3, time_s, distance);
+        let task = there_and_back(f64::from(run.cycles) * 1e-3, time_s, distance, time_s);
         let output = rig.cycle(&rig.input(&task));
-        let pose = rig.simulator.state().pose;
+        let pose = rig.simulator().state().pose;
         if output.state.has_control() {
             assert!(before(machine, &pose), "{time_s} s, {distance:e}: beyond");
             run.condition = run.condition.max(KinematicState::new(machine, pose).sensitivity().condition);
@@ -119,11 +100,7 @@ fn nearer_than_the_limit_of_condition_is_stopped_before() {
         assert!(run.condition < 100.03, "{what}: {}", run.condition);
         if distance > CONDITION / 100.0 {
             assert_forces(&run, &what);
-            assert_eq!(
-                (run.last.state, run.last.diagnostic.code),
-                (State::Active, DiagnosticCode::None),
-                "{what}"
-            );
+            assert_eq!(reason(&run.last), (State::Active, DiagnosticCode::None), "{what}");
             assert!((run.condition * distance / CONDITION - 1.0).abs() < 0.02, "{what}: {}", run.condition);
             continue;
         }
@@ -154,19 +131,13 @@ fn under_the_policy_limit_the_platform_waits_before_the_limit_of_condition() {
         let mut most = 0.0_f64;
         let mut k = 0;
         while f64::from(k) < 2e3 * time_s + 1e3 {
-            let task = there_and_back(f64::from(k) * 1e-3, time_s, -0.1);
+            let task = there_and_back(f64::from(k) * 1e-3, time_s, -0.1, time_s);
             let output = rig.cycle(&rig.input(&task));
-            assert_eq!(
-                (output.state, output.diagnostic.code),
-                (State::Active, DiagnosticCode::None),
-                "{time_s} s, cycle {k}: {:?}",
-                output.diagnostic
-            );
-            let pose = rig.simulator.state().pose;
+            assert_eq!(reason(&output), (State::Active, DiagnosticCode::None), "{time_s} s, cycle {k}");
+            let pose = rig.simulator().state().pose;
             most = most.max(KinematicState::new(&config.machine, pose).sensitivity().condition);
             k += 1;
         }
-        println!("{time_s} s: condition of up to {most}");
         assert!((50.0..100.0).contains(&most), "{time_s} s: {most}");
     }
 }
@@ -179,20 +150,13 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
         let what = format!("{distance:e} rad, {time_s} s");
         assert_forces(&run, &what);
         if distance > CONDITION / MAX_CONDITION {
-            assert_eq!(
-                (run.last.state, run.last.diagnostic.code),
-                (State::Active, DiagnosticCode::None),
-                "{what}"
-            );
+            assert_eq!(reason(&run.last), (State::Active, DiagnosticCode::None), "{what}");
             assert!((run.holding * distance / HOLDING_N - 1.0).abs() < 0.15, "{what}: {} N", run.holding);
             continue;
         }
         assert_eq!(run.last.state, State::Fault, "{what}");
-        assert!(
-            [DiagnosticCode::NearSingular, DiagnosticCode::SingularPose].contains(&run.last.diagnostic.code),
-            "{what}: {:?}",
-            run.last
-        );
+        let codes = [DiagnosticCode::NearSingular, DiagnosticCode::SingularPose];
+        assert!(codes.contains(&run.last.diagnostic.code), "{what}: {:?}", run.last);
         assert!((300.0..1.2 * MAX_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
     }
 }
@@ -208,7 +172,7 @@ fn drives_that_are_too_weak_on_the_way_are_told_and_end_in_a_stop() {
             config.machine.actuator.max_force = 20e3;
             let more = (0..)
                 .position(|k| {
-                    let task = there_and_back(f64::from(k) * 1e-3, time_s, distance);
+                    let task = there_and_back(f64::from(k) * 1e-3, time_s, distance, time_s);
                     largest(&inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap()) > 20e3
                 })
                 .unwrap() as u32;

@@ -1,17 +1,7 @@
 //! A platform of a centimetre and one of fifty metres, with C on it and a thousand radii away: the same relative
 //! errors.
 
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::{Outcome, refine};
-use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use nalgebra::Vector3;
-
-use super::common::stability::trials::{pose, rigid};
-use super::common::{Errors, Legs, machine};
+use super::*;
 
 /// Radii of the platforms \[m\].
 const RADII: [f64; 4] = [0.01, 0.5, 5.0, 50.0];
@@ -80,7 +70,6 @@ fn nearby(there: &Pose, center: &Vector3<f64>, radius: f64) -> Pose {
 fn pose_errors_do_not_depend_on_the_size() {
     let errors = RADII.map(|radius| pose_errors(radius, 0.0));
     let rms = errors.map(|errors| errors.rms());
-    println!("{rms:?}");
     let (least, most) =
         (rms.iter().copied().fold(f64::NAN, f64::min), rms.iter().copied().fold(0.0, f64::max));
     assert!(most < ALIKE * least && most < 1e-14, "{rms:?}");
@@ -91,7 +80,6 @@ fn pose_errors_do_not_depend_on_the_size() {
 fn a_distant_origin_costs_the_digits_of_its_distance() {
     let near = pose_errors(1.0, 0.0).rms();
     let far = pose_errors(1.0, 1000.0).rms();
-    println!("near {near:.1e}, C at a thousand radii {far:.1e}");
     assert!(far / near < 1000.0 * ALIKE && far / near > 10.0, "{near:e} {far:e}");
 }
 
@@ -104,21 +92,12 @@ fn a_distant_origin_costs_forces_the_digits_of_its_distance() {
         let mut errors = Errors::default();
         for number in 0..2000 {
             let there = rigid(pose(&centered, 0.2, number));
-            let arm = there.rotation * Vector3::repeat(offset);
             let (twist, acceleration) = moving();
-            let at = |pose, arm: Vector3<f64>| Motion {
-                pose,
-                twist: Twist { linear: twist.linear + twist.angular.cross(&arm), ..twist },
-                acceleration: Acceleration {
-                    linear: acceleration.linear
-                        + acceleration.angular.cross(&arm)
-                        + twist.angular.cross(&twist.angular.cross(&arm)),
-                    ..acceleration
-                },
-            };
-            let exact = middle.forces::<Exact>(&at(there, Vector3::zeros())).unwrap();
-            let motion = at(Pose { position: there.position + arm, ..there }, arm);
-            let largest = super::common::largest(&exact);
+            let centered = Motion { pose: there, twist, acceleration };
+            let tool = Pose { rotation: Matrix3::identity(), position: Vector3::repeat(offset) };
+            let motion = Frames { tool, ..Frames::default() }.tool_motion(&centered);
+            let exact = middle.forces::<Exact>(&centered).unwrap();
+            let largest = largest(&exact);
             for (exact, found) in exact.iter().zip(moved.forces::<Exact>(&motion).unwrap()) {
                 errors.add((found - exact) / largest);
             }
@@ -126,7 +105,6 @@ fn a_distant_origin_costs_forces_the_digits_of_its_distance() {
         errors.rms()
     };
     let [near, far] = [1.0, 1000.0].map(errors);
-    println!("C at a radius {near:e}, at a thousand {far:e}");
     assert!((10.0..1000.0 * ALIKE).contains(&(far / near)), "{near:e} {far:e}");
     assert!(far < 1e-11, "{far:e}");
 }

@@ -6,8 +6,8 @@ use hexad::control::signals::state::{Request, State};
 use hexad::control::supervision::supervisor::{Findings, SupervisorState, next};
 use rayon::prelude::*;
 
-use super::common::certificate::{Certificate, cases};
 use super::oracle;
+use hexad_support::certificate::{Certificate, cases};
 
 const GOALS: [AfterStop; 3] = [AfterStop::Standby, AfterStop::Park, AfterStop::Fault];
 

@@ -98,7 +98,10 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
         // It may move without force: first it comes to rest.
         (idle && is(Park) && could_start.is_ok(), &|| to_stop(requested, AfterStop::Park)),
         (idle && is(Park), &|| (rest, could_start.err())),
-        (idle && is(Clear), &|| (shown(found), None)),
+        // A drive's fault is none of the daemon's, which it could clear.
+        (idle && is(Clear), &|| {
+            (shown(found), found.engagement.err().filter(|it| it.code == DiagnosticCode::DriveFault))
+        }),
         (idle, &|| (rest, None)),
         // What cannot be followed any more ends in a stop, whatever is asked.
         (ends.is_some_and(|found| LOSSES.contains(&found.code)), &|| to_stop(ends.unwrap(), after_loss)),

@@ -15,8 +15,8 @@ use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use super::common::rig::Rig;
-use super::common::{deployed, largest};
+use hexad_support::rig::Rig;
+use hexad_support::{deployed, largest};
 
 static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     let mut config = deployed("motion_base");

@@ -5,8 +5,8 @@ use std::fs;
 
 use nalgebra::Vector3;
 
-use super::common::{Errors, MACHINES, Table, angle_between, angular_velocity, data, largest, rotation};
 use super::{hexad, hexad_on_vectors, six_each, with_t};
+use hexad_support::{Errors, MACHINES, Table, angle_between, angular_velocity, data, largest, rotation};
 
 /// Metres and radians.
 const POSE_BOUND: f64 = 1e-11;
@@ -17,7 +17,7 @@ const TWIST_BOUND: f64 = 1e-10;
 /// Newton needs four or five iterations a step; from one row to the next it may take forty trusted steps.
 const MOST_ITERATIONS: f64 = 150.0;
 
-const POSE: [&str; 8] = ["alpha", "beta", "gamma", "x", "y", "z", "iterations", "converged"];
+const POSE: [&str; 9] = ["alpha", "beta", "gamma", "x", "y", "z", "iterations", "converged", "other_poses"];
 const TWIST: [&str; 6] = ["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"];
 
 fn check_poses(ours: &Table, reference: &Table, what: &str) {

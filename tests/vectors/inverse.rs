@@ -2,8 +2,8 @@
 
 use hexad::model::joint_space::{LegDynamics, joint_space};
 
-use super::common::{Errors, MACHINES, Table, data, largest, machine, motions};
 use super::{hexad_on_vectors, six_each, with_t};
+use hexad_support::{Errors, MACHINES, Table, data, largest, machine, motions};
 
 /// Of the largest force of the row.
 const FORCE_BOUND: f64 = 1e-12;

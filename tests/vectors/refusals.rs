@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use super::common::data;
 use super::{Ran, hexad};
+use hexad_support::data;
 
 const LENGTHS: &str = "t,length_1,length_2,length_3,length_4,length_5,length_6";
 const ROW: &str = "0,1.1,1.1,1.1,1.1,1.1,1.1";

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::common::{Table, data};
 use super::hexad;
+use hexad_support::{Table, data};
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)

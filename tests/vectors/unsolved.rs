@@ -4,8 +4,9 @@ use std::fs;
 
 use nalgebra::{Rotation3, Vector3};
 
-use super::common::{Legs, Table, data, machine};
 use super::{Ran, hexad, hexad_on_vectors, six_each, with_t};
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad_support::{Legs, Table, data, machine, repository};
 
 /// Forward kinematics of the first rows of a machine, some rows with other lengths.
 fn with_lengths(name: &str, replaced: &[(usize, [f64; 6])], options: &[&str]) -> Ran {
@@ -37,10 +38,10 @@ fn unreachable_lengths_are_marked_and_the_rest_is_solved() {
             &["--start", start],
         );
         assert_eq!(ran.code, Some(1), "{}", ran.message);
-        assert_eq!(
-            ran.message,
-            "hexad: 3 of 10 rows did not converge (column converged), the first at t = 0.003\n"
-        );
+        let words = "hexad: 3 of 10 rows have lengths outside of the stroke, the first at t = 0.003: length_1 = 9 m, must be ";
+        assert!(ran.message.starts_with(words), "{}", ran.message);
+        let error = "\nhexad: 3 of 10 rows did not converge (column converged), the first at t = 0.003\n";
+        assert!(ran.message.ends_with(error), "{}", ran.message);
         let ours = ran.complete_table();
         let well = hexad_on_vectors("forward-kinematics", "fried2008", &["--start", start]).table();
         assert_eq!((ours.rows.len(), &ours.header), (10, &well.header));
@@ -58,8 +59,58 @@ fn no_row_may_be_solvable() {
     let unreachable: Vec<_> = (0..10).map(|row| (row, [9.0, 0.9, 0.9, 0.9, 0.9, 0.9])).collect();
     let ran = with_lengths("fried2008", &unreachable, &[]);
     assert_eq!(ran.code, Some(1), "{}", ran.message);
-    assert!(ran.message.starts_with("hexad: 10 of 10 rows did not converge"), "{}", ran.message);
+    assert!(
+        ran.message.starts_with("hexad: 10 of 10 rows have lengths outside of the stroke"),
+        "{}",
+        ran.message
+    );
     assert_eq!(ran.complete_table().rows.len(), 10);
+    // Within the stroke, but of no platform: one leg would pull all joints beyond the others.
+    let machine = machine("fried2008");
+    let (min, max) = (machine.actuator.min_length, machine.actuator.max_length);
+    let ran = with_lengths("fried2008", &[(2, [max, min, max, min, max, min])], &[]);
+    let message = "hexad: 1 of 10 rows did not converge (column converged), the first at t = 0.002\n";
+    assert_eq!((ran.code, ran.message.as_str()), (Some(1), message));
+}
+
+/// From home each of these rows leads to another pose of the same lengths, up to 0.9 m away, at which nothing is singular.
+#[test]
+fn rows_with_other_poses_are_marked() {
+    let (machine, lengths) =
+        (repository().join("config/tsai2000.toml"), data("other_assembly_lengths", "csv"));
+    for (options, code) in [(&["--start", "home"][..], 0), (&["--start", "home", "--strict"], 1)] {
+        let ran = hexad("forward-kinematics", &machine, &lengths, options);
+        assert_eq!(ran.code, Some(code), "{}", ran.message);
+        let message = "hexad: 12 of 12 rows have the lengths of other poses, too (column other_poses), the first at t = 0.0\n";
+        assert_eq!(ran.message, message);
+        let ours = ran.complete_table();
+        assert!(
+            (0..12).all(|row| ours.number(row, "other_poses") >= 1.0 && ours.number(row, "converged") == 1.0)
+        );
+    }
+}
+
+/// Lengths that are none of the joints' distances in metres are told from what else they may be.
+#[test]
+fn what_else_lengths_outside_of_the_stroke_may_be_is_named() {
+    let machine = machine("fried2008");
+    let home = leg_lengths(&machine, &machine.home_pose());
+    let of = |change: fn(f64, f64) -> f64| {
+        let rows: Vec<_> =
+            (0..10).map(|row| (row, home.map(|home| change(home, 1e-4 * row as f64)))).collect();
+        with_lengths("fried2008", &rows, &[]).message
+    };
+    for (message, hint) in [
+        (
+            of(|home, change| 1e3 * (home + change)),
+            "; in millimetres all rows fit: name the columns length_1_mm to length_6_mm\n",
+        ),
+        (of(|_, change| change), "; as changes from home all rows fit: add the lengths at home, ["),
+        (of(|home, _| home + 10.0), ", between the joint centres\n"),
+    ] {
+        assert!(message.starts_with("hexad: 10 of 10 rows have lengths outside of the stroke"), "{message}");
+        assert!(message.contains(hint), "{message}");
+    }
 }
 
 /// All legs in one plane can carry nothing across it.

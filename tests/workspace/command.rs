@@ -1,14 +1,6 @@
 //! `hexad workspace` as it is used.
 
-use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-
-use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
-use hexad::model::task::TaskState;
-use tempfile::TempDir;
-
-use super::common::{Table, deployed};
+use super::*;
 
 fn config(name: &str) -> String {
     format!("{}/config/{name}.toml", env!("CARGO_MANIFEST_DIR"))
@@ -119,7 +111,6 @@ fn what_is_asked_for_wrongly_is_refused() {
     }
     refused(&["--turn", "91deg"], &["'91deg'", "must be in [0deg, 90deg]"]);
     refused(&["--turn", "10"], &["has no unit: say 10deg or 10rad"]);
-    refused(&["--turn-deg", "10"], &["unexpected argument '--turn-deg'", "its value has one: --turn 5deg"]);
     refused(&["--through", "0,0,1m"], &["'0,0,1m'", "must be 6 values, as in 0,0,5deg,0,0,1.25m"]);
     refused(&["--through", "0,0,0,0,0,1.9"], &["1.9 has no unit: say 1.9mm or 1.9m"]);
     let through = "--through [0.0, 0.0, 0.0, 0.0, 0.0, 1.9] [rad, m]: must be a pose";

@@ -1,16 +1,6 @@
 //! Worst forces and payloads, found again by the ordinary inverse dynamics over many directions.
 
-use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::task::TaskState;
-use nalgebra::Vector3;
-
-use super::common::{MACHINES, largest, machine};
-use super::{beside_home, directions};
+use super::*;
 
 const DIRECTIONS: u32 = 10_000;
 const POSES: u32 = 4;
@@ -86,7 +76,7 @@ fn a_machine_with_its_payload_is_at_the_actuators_limit() {
 #[test]
 fn what_weighs_nothing_has_no_limit_and_what_is_too_much_carries_nothing() {
     let mut machine = machine("fried2008");
-    let home = TaskState::at_rest(machine.home).motion().pose;
+    let home = machine.home_pose();
     let hard = AccelerationDemand { linear: 1e4, angular: 0.0 };
     let quality = PoseEvaluator::new(&machine, hard).quality(&home);
     assert!(quality.payload == 0.0 && quality.worst_force > machine.actuator.max_force, "{quality:?}");
@@ -107,7 +97,7 @@ fn reach_ends_with_the_stroke_and_at_singular_poses() {
     };
     let [.., z] = machine.home;
     let home = at(z);
-    let lengths = leg_lengths(&machine, &TaskState::at_rest(machine.home).motion().pose);
+    let lengths = leg_lengths(&machine, &machine.home_pose());
     let margin = machine.actuator.max_length - largest(&lengths);
     assert!((home.stroke_margin - margin).abs() < 1e-12, "{home:?}");
     assert!(home.within_reach() && home.determinant > 0.0);

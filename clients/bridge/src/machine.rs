@@ -1,7 +1,7 @@
 //! The machine that a bridge connects.
 
-use hexad::config::Config;
-use hexad::messages::Bus;
+use hexad_client::messages::Bus;
+use hexad_machine::config::Config;
 
 /// Joins the machine of a configuration, which the network file must name. An error says what prevents it.
 pub fn join(name: &str, config: &Config) -> Result<Bus, String> {

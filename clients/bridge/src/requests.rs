@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use hexad::control::signals::state::Request;
-use hexad::operator::protocol::is_stop;
-use hexad::operator::requests::carry_out;
-use hexad::operator::stops::stop_machine;
-use hexad::operator::{OperatorError, Order};
+use hexad_client::operator::protocol::is_stop;
+use hexad_client::operator::requests::carry_out;
+use hexad_client::operator::stops::stop_machine;
+use hexad_client::operator::{OperatorError, Order};
+use hexad_core::control::signals::state::Request;
 
 /// Longest wait for the result of a request.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -25,7 +25,7 @@ pub fn requests_of_names(names: &[String]) -> Result<Vec<Request>, String> {
 
 /// Carries out a request of a remote side, which the log of the daemon names. Returns the name of the resulting state.
 pub fn carry_out_for(machine: &str, request: Request, remote: &str) -> Result<String, OperatorError> {
-    let order = Order { request, is_patient: false, timeout: TIMEOUT, remote: Some(remote) };
+    let order = Order { remote: Some(remote), ..Order::new(request, TIMEOUT) };
     if is_stop(request) {
         stop_machine(machine, &order, &|| false)
     } else {

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
-use hexad::config::Config;
-use hexad::control::parameters::ViolationPolicy;
-use hexad::control::signals::inputs::{Setpoint, SetpointKind};
-use hexad::messages::source_clock::SourceClock;
-use hexad::messages::{Bus, PortError, Publisher, SetpointMessage};
-use hexad::model::task::TaskState;
+use hexad_client::messages::source_clock::SourceClock;
+use hexad_client::messages::{Bus, PortError, Publisher, SetpointMessage};
+use hexad_core::control::parameters::ViolationPolicy;
+use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
+use hexad_core::model::task::TaskState;
+use hexad_machine::config::Config;
 use tracing::info;
 
 use crate::rejection::Rejection;

@@ -1,13 +1,13 @@
-//! Inverse dynamics of many motions: `hexad::analysis::batch` on arrays of the caller.
+//! Inverse dynamics of many motions: `hexad_machine::analysis::batch` on arrays of the caller.
 
 use core::ffi::c_char;
 use std::path::Path;
 use std::{ptr, slice};
 
-use hexad::analysis::batch::{self, Row, forces_of_rows};
-use hexad::config::Config;
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::Fidelity;
+use ::hexad_core::model::active_forces::InverseDynamics;
+use ::hexad_core::model::fidelity::Fidelity;
+use ::hexad_machine::analysis::batch::{self, Row, forces_of_rows};
+use ::hexad_machine::config::Config;
 
 use crate::outcome::hexad_result::{self, HEXAD_INVALID, HEXAD_OK};
 use crate::outcome::{Failure, guard};

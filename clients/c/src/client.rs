@@ -3,8 +3,8 @@
 use std::process;
 use std::sync::{Mutex, TryLockError};
 
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{
+use ::hexad_client::messages::clock::monotonic_ns;
+use ::hexad_client::messages::{
     Bus, CommandMessage, ForceMessage, MeasuredMessage, Message, Publisher, SetpointMessage,
     StatisticsMessage, StatusMessage, Subscriber,
 };

@@ -1,9 +1,9 @@
-//! Change of coordinates between the platform in the base frame and a tool in a work frame: `hexad::motion::frames`.
+//! Change of coordinates between the platform in the base frame and a tool in a work frame: `hexad_core::motion::frames`.
 
-use hexad::messages::SetpointMessage;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::task::{TaskState, task_coordinates};
-use hexad::motion::frames::Frames;
+use ::hexad_client::messages::SetpointMessage;
+use ::hexad_core::model::rigid::{Acceleration, Motion, Pose, Twist};
+use ::hexad_core::model::task::{TaskState, task_coordinates};
+use ::hexad_core::motion::frames::Frames;
 
 use crate::outcome::hexad_result::{self, HEXAD_INVALID, HEXAD_OK};
 use crate::outcome::{Failure, guard};

@@ -15,8 +15,8 @@ pub mod request;
 use core::ffi::{CStr, c_char};
 use std::ptr;
 
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{
+use ::hexad_client::messages::clock::monotonic_ns;
+use ::hexad_client::messages::{
     CommandMessage, ForceMessage, MeasuredMessage, SetpointMessage, StatisticsMessage, StatusMessage,
 };
 

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use hexad::control::signals::state::Request;
-use hexad::operator::protocol::is_stop;
-use hexad::operator::requests::carry_out;
-use hexad::operator::stops::stop_machine;
-use hexad::operator::{OperatorError, Order};
+use ::hexad_client::operator::protocol::is_stop;
+use ::hexad_client::operator::requests::carry_out;
+use ::hexad_client::operator::stops::stop_machine;
+use ::hexad_client::operator::{OperatorError, Order};
+use ::hexad_core::control::signals::state::Request;
 
 use crate::outcome::hexad_result::{
     self, HEXAD_FORBIDDEN, HEXAD_INTERNAL, HEXAD_INVALID, HEXAD_NO_DAEMON, HEXAD_NOT_COMPLETED, HEXAD_OK,
@@ -25,8 +25,7 @@ pub fn send(machine: &str, request: u32, until_ready: bool, within_s: f64) -> Ou
         let text = format!("within_s = {within_s} s is not between 0 and {MAX_WITHIN_S} s");
         return Err(Failure::new(HEXAD_INVALID, text));
     }
-    let order =
-        Order { request, is_patient: until_ready, timeout: Duration::from_secs_f64(within_s), remote: None };
+    let order = Order { is_patient: until_ready, ..Order::new(request, Duration::from_secs_f64(within_s)) };
     let never = || false;
     let outcome = match is_stop(request) {
         true => stop_machine(machine, &order, &never),

@@ -3,12 +3,12 @@
 //! The load of a leg at rest acts on its closed brake already. The drive, whose operation is enabled while its brake stays closed
 //! (`brake_hold`), pushes in the direction of the load with what is missing to the test load. All other drives have no power.
 
-use hexad::model::LEGS;
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::{Tracker, TrackingResult};
-use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad_core::model::LEGS;
+use hexad_core::model::active_forces::inverse_dynamics;
+use hexad_core::model::fidelity::Exact;
+use hexad_core::model::forward_kinematics::{Tracker, TrackingResult};
+use hexad_core::model::machine::Machine;
+use hexad_core::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 use crate::bus::Bus;
 use crate::cia402::Goal;

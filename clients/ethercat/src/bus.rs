@@ -9,8 +9,7 @@ use std::time::Duration;
 
 use ethercrab::{MainDevice, MainDeviceConfig, PduRx, PduStorage, PduTx, RetryBehaviour, Timeouts};
 
-use crate::link::Link;
-use crate::segment::MAX_FRAME;
+use crate::link::{Link, MAX_FRAME};
 use crate::timer::take_next_wake_ns;
 
 /// Memory of the frames under way.

@@ -7,17 +7,17 @@
 //! A drive with a fault, a device that is missing or not in OP, or too many lost frames stop all six drives in the same cycle.
 
 use ethercrab::{Command, RegisterAddress, SubDeviceState};
-use hexad::messages::{ForceMessage, MeasuredMessage};
-use hexad::model::LEGS;
+use hexad_client::messages::{ForceMessage, MeasuredMessage};
+use hexad_core::model::LEGS;
 use tracing::{info, warn};
 
+use crate::al_state;
 use crate::bus::Bus;
 use crate::cia402::Goal;
 use crate::drives_file::{BusSection, OnBrake};
 use crate::link::Link;
 use crate::permission::Permission;
 use crate::process_data::{Exchange, ProcessData};
-use crate::segment::application_layer::al_state;
 use crate::startup::{FIRST_ADDRESS, OpDevices};
 
 /// Interval at which the driver looks for the forces \[ns\].
@@ -173,7 +173,7 @@ impl<D: Daemon> Driver<D> {
         if let Some(message) = self.daemon.receive(now_ns)
             && self.permission.receive(message)
         {
-            info!("the daemon's fault is cleared: faults of drives are acknowledged");
+            info!("the daemon has no fault: faults of drives are acknowledged");
             self.resets_until_cycle = self.counts.cycles + RECOVERY_CYCLES;
         }
     }

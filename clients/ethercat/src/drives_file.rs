@@ -1,6 +1,6 @@
 //! `NAME-drives.toml`: interface, timing, and the six drives of a machine.
 
-use hexad::model::LEGS;
+use hexad_core::model::LEGS;
 use serde::Deserialize;
 use toml::{Table, Value};
 

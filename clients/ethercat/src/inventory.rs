@@ -1,17 +1,27 @@
 //! What is on the bus, and everything in which it contradicts a drives file.
 
-use hexad::model::LEGS;
+use hexad_core::model::LEGS;
 
 use crate::bus::Bus;
 use crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE_BIT;
 use crate::drives_file::{DrivesFile, LegSection};
 use crate::link::Link;
 use crate::objects;
-use crate::segment::sii::Identity;
 use crate::startup::PreOpDevices;
 
 /// Rated torques of file and drive may differ by this share: drives round it.
 const RATED_TORQUE_TOLERANCE: f64 = 0.01;
+
+/// Vendor, product and serial number of a device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// Number that the EtherCAT Technology Group has assigned.
+    pub vendor: u32,
+    /// Of the vendor.
+    pub product: u32,
+    /// Of the device.
+    pub serial: u32,
+}
 
 /// Vendor, product and serial number of each device.
 pub fn identities<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices) -> Vec<Identity> {

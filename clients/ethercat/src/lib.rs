@@ -6,11 +6,12 @@
 //! | [`drives_file`], [`file_edit`], [`machine_check`] | the file of the drives, changes of it, contradictions to the machine file |
 //! | [`segment`], [`simulation`] | six simulated drives with the simulated platform that they move, as a file describes them |
 //! | [`link`], [`raw_socket`], [`simulated_link`], [`timer`] | Ethernet frames and their clock: real, or simulated |
-//! | [`bus`], [`sdo`], [`inventory`], [`scan`], [`startup`] | main device, objects of drives, what is on the bus, the way to OP |
+//! | [`bus`], [`al_state`], [`sdo`], [`inventory`], [`scan`], [`startup`] | main device, objects of drives, what is on the bus, the way to OP |
 //! | [`sync_clock`], [`process_image`], [`process_data`], [`leg_drive`] | grid of SYNC0, bytes of the process data, their exchange, one drive in it |
 //! | [`permission`], [`cycle`], [`topics`] | whether forces may be applied, the cycle with the daemon |
 //! | [`jog`], [`brake_test`] | motion of one leg, load on one closed brake |
 
+pub mod al_state;
 pub mod brake_test;
 pub mod bus;
 pub mod cia402;

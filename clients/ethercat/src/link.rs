@@ -1,5 +1,8 @@
 //! What the driver needs of an Ethernet interface and its clock.
 
+/// Longest Ethernet frame without checksum.
+pub const MAX_FRAME: usize = 1514;
+
 /// Interface that sends and receives whole Ethernet frames, with the clock of its instants.
 pub trait Link {
     /// Present instant \[ns\]: CLOCK_MONOTONIC, or simulated.

@@ -1,8 +1,8 @@
 //! Contradictions between a drives file and a machine file.
 
-use hexad::config::Config;
-use hexad::model::LEGS;
-use hexad::realtime::cyclic::ReleaseMode;
+use hexad_client::realtime::cyclic::ReleaseMode;
+use hexad_core::model::LEGS;
+use hexad_machine::config::Config;
 
 use crate::drives_file::DrivesFile;
 

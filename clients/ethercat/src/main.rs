@@ -5,15 +5,15 @@ mod commands;
 use std::process::ExitCode;
 
 use clap::Parser;
-use hexad::commands::log::{self, LogFormat};
-use hexad::realtime::allocation::CountingAllocator;
+use hexad_client::realtime::allocation::CountingAllocator;
+use hexad_machine::log::{self, LogFormat};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     let command = commands::CommandLine::parse();
-    log::install(LogFormat::Text);
+    let _log = log::install(LogFormat::Text);
     match command.execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

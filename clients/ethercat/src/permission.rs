@@ -1,7 +1,7 @@
 //! Whether the drives may apply forces: what the daemon has sent, and what has happened on the bus since.
 
-use hexad::control::signals::state::State;
-use hexad::messages::ForceMessage;
+use hexad_client::messages::ForceMessage;
+use hexad_core::control::signals::state::State;
 
 /// Newest force message and its permission.
 #[derive(Clone, Copy, Debug)]
@@ -10,6 +10,8 @@ pub struct Permission {
     longest_age_ns: u64,
     /// A failure of the bus or a drive has ended the permission.
     is_stopped: bool,
+    /// Faults of the drives wait until the daemon is in no fault: it had one, or drives had some when this driver began.
+    awaits_clear: bool,
     /// The driver ends.
     is_ended: bool,
 }
@@ -17,17 +19,26 @@ pub struct Permission {
 impl Permission {
     /// No permission until a message grants it. A message counts for no longer than `longest_age_ns`.
     pub fn new(longest_age_ns: u64) -> Self {
-        Self { newest: ForceMessage::default(), longest_age_ns, is_stopped: true, is_ended: false }
+        Self {
+            newest: ForceMessage::default(),
+            longest_age_ns,
+            is_stopped: true,
+            awaits_clear: true,
+            is_ended: false,
+        }
     }
 
     /// Takes in a message. After a failure forces may be applied again once the daemon has sent one that is not valid: it has
-    /// noticed, and an operator engages anew. Whether this message ends a fault of the daemon, as an operator has cleared it.
+    /// noticed, and an operator engages anew. Whether faults of the drives are acknowledged with it: an operator has cleared the
+    /// daemon's, also before this driver began.
     pub fn receive(&mut self, message: ForceMessage) -> bool {
-        let fault = State::Fault as u32;
-        let is_cleared = self.newest.state == fault && message.state != fault;
-        self.is_stopped &= message.valid == 1;
         self.newest = message;
-        is_cleared
+        if message.valid == 1 {
+            return false;
+        }
+        self.is_stopped = false;
+        let has_fault = message.state == State::Fault as u32;
+        core::mem::replace(&mut self.awaits_clear, has_fault) && !has_fault
     }
 
     /// Ends the permission; whether there was one.
@@ -56,7 +67,7 @@ impl Permission {
 
 #[cfg(test)]
 mod tests {
-    use hexad::messages::Message;
+    use hexad_client::messages::Message;
 
     use super::*;
 
@@ -73,7 +84,7 @@ mod tests {
         let mut permission = Permission::new(5000);
         permission.receive(message(1, true, State::Active));
         assert!(permission.forces(1000).is_none(), "the daemon was in control before this driver began");
-        permission.receive(message(2, false, State::Standby));
+        assert!(permission.receive(message(2, false, State::Standby)), "cleared before this driver began");
         assert!(permission.forces(2000).is_none(), "not valid");
         permission.receive(message(3, true, State::Engaging));
         assert!(permission.forces(3000).is_some());

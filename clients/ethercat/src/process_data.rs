@@ -1,7 +1,7 @@
 //! Exchange of the process data of six drives.
 
 use ethercrab::SubDeviceState;
-use hexad::model::LEGS;
+use hexad_core::model::LEGS;
 
 use crate::bus::Bus;
 use crate::cia402::Goal;

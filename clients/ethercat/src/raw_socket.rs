@@ -7,8 +7,8 @@ use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener};
 use std::{io, mem};
 
-use hexad::messages::clock::monotonic_ns;
-use hexad::realtime::clock;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::realtime::clock;
 
 use crate::link::Link;
 

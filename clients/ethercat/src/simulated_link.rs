@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use crate::link::Link;
-use crate::segment::{MAX_FRAME, Segment};
+use crate::link::{Link, MAX_FRAME};
+use crate::segment::Segment;
 use crate::timer;
 
 /// From the main device to the devices, and back \[ns\].

@@ -1,21 +1,24 @@
 //! The simulated segment that a drives file describes: try a file without its machine.
 
-use hexad::commands::plant::hardware;
-use hexad::config::Config;
-use hexad::model::LEGS;
+use hexad_core::model::LEGS;
+use hexad_machine::config::Config;
 
 use crate::drives_file::DrivesFile;
+use crate::inventory::Identity;
 use crate::segment::Segment;
 use crate::segment::device::DeviceModel;
 use crate::segment::mechanics::Mechanics;
-use crate::segment::sii::Identity;
 
 /// Deviations of the devices' clocks, in millionths: cheap crystals.
 const DRIFTS_PPM: [f64; LEGS] = [30.0, -12.0, 45.0, -40.0, 8.0, -50.0];
 
 /// Devices as the file expects them, with the simulated platform of the machine.
 pub fn segment(file: &DrivesFile, machine: &Config, now_ns: u64) -> Segment {
-    with_mechanics(file, Mechanics::Platform(Box::new(hardware(machine))), now_ns)
+    with_mechanics(
+        file,
+        Mechanics::Platform(Box::new(machine.deployment.plant.hardware(&machine.machine))),
+        now_ns,
+    )
 }
 
 /// Devices as the file expects them, with legs that are not coupled to a platform and stand at a length.

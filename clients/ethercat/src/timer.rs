@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::task::Waker;
 
 use embassy_time_driver::{Driver, TICK_HZ};
-use hexad::messages::clock::monotonic_ns;
+use hexad_client::messages::clock::monotonic_ns;
 
 const NS_PER_TICK: u64 = 1_000_000_000 / TICK_HZ;
 

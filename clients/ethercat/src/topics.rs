@@ -1,6 +1,6 @@
 //! The daemon over its topics.
 
-use hexad::messages::{Bus, ForceMessage, MeasuredMessage, PortError, Publisher, Subscriber};
+use hexad_client::messages::{Bus, ForceMessage, MeasuredMessage, PortError, Publisher, Subscriber};
 
 use crate::cycle::Daemon;
 

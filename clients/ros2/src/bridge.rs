@@ -3,14 +3,13 @@
 use std::thread::sleep;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use hexad::commands::plant::prepare_thread;
-use hexad::config::Config;
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{MeasuredMessage, StatusMessage, Subscriber};
-use hexad::realtime::stop_request::Stop;
 use hexad_bridge::machine::join;
 use hexad_bridge::rejection::{Rejection, RejectionLog};
 use hexad_bridge::setpoint_relay::SetpointRelay;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{MeasuredMessage, StatusMessage, Subscriber};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_machine::config::Config;
 use ros2_client::{Gid, Publisher, Subscription};
 use tracing::info;
 
@@ -88,7 +87,7 @@ impl<'a> Bridge<'a> {
 
     /// Relays until a signal.
     pub fn run(&mut self, stop: &Stop) {
-        prepare_thread(self.telemetry.config);
+        self.telemetry.config.deployment.realtime.prepare_peer_thread();
         info!("the bridge is open");
         while !stop.is_requested() {
             sleep(PERIOD);

@@ -1,9 +1,9 @@
 //! Motions from and to messages of ROS 2, whose quantities are all in the frame `base`.
 
-use hexad::control::signals::inputs::SetpointKind;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::task::{TaskState, task_coordinates};
 use hexad_bridge::rejection::Rejection;
+use hexad_core::control::signals::inputs::SetpointKind;
+use hexad_core::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad_core::model::task::{TaskState, task_coordinates};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::ros_messages as ros;

@@ -4,10 +4,11 @@
 //! | --- | --- |
 //! | [`network_file`] | the file of the networks |
 //! | [`ros_messages`], [`conversion`], [`telemetry`] | messages of ROS 2, motions in them, measured motion as messages |
-//! | [`node`], [`requests`], [`bridge`] | the node with its topics and services, requests, the loop |
+//! | [`node`], [`first_request`], [`requests`], [`bridge`] | the node with its topics and services, requests, the loop |
 
 mod bridge;
 mod conversion;
+mod first_request;
 mod network_file;
 mod node;
 mod requests;
@@ -19,9 +20,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use hexad::commands::log::{self, LogFormat};
-use hexad::config::Config;
-use hexad::realtime::stop_request::Stop;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_machine::config::Config;
+use hexad_machine::log::{self, LogFormat};
 
 use crate::bridge::Bridge;
 use crate::network_file::NetworkFile;
@@ -51,7 +52,7 @@ impl CommandLine {
 
 fn main() -> ExitCode {
     let command = CommandLine::parse();
-    log::install(LogFormat::Text);
+    let _log = log::install(LogFormat::Text);
     match command.execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

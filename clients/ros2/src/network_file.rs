@@ -2,8 +2,8 @@
 
 use std::net::IpAddr;
 
-use hexad::control::signals::state::Request;
 use hexad_bridge::requests::{STOPS, requests_of_names};
+use hexad_core::control::signals::state::Request;
 use nix::ifaddrs::getifaddrs;
 use serde::Deserialize;
 use serde::de::IgnoredAny;

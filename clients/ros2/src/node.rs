@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::net::IpAddr;
+use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
@@ -14,6 +15,7 @@ use ros2_client::{
     ServiceMapping, ServiceTypeName, Subscription,
 };
 
+use crate::first_request::repair_first_requests;
 use crate::network_file::Ros2Section;
 use crate::ros_messages::{RosMessage, TriggerRequest, TriggerResponse};
 
@@ -42,14 +44,16 @@ impl BridgeNode {
             .with_only_networks(addresses)
             .same_host_loopback(is_loopback)
             .build();
-        let context = Context::from_domain_participant(participant.map_err(text)?).map_err(text)?;
+        let participant = participant.map_err(text)?;
+        let first_requests = repair_first_requests(participant.clone()).map_err(text)?;
+        let context = Context::from_domain_participant(participant).map_err(text)?;
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let name = NodeName::new(&section.namespace, "hexad_ros2").map_err(text)?;
         let mut node = context.new_node(name, options).map_err(text)?;
         let spinner = node.spinner().map_err(text)?;
         thread::spawn(move || block_on(spinner.spin()));
         let names = NodeNames::default();
-        names.watch(&node);
+        names.watch(&node, first_requests);
         Ok(Self { node, namespace: section.namespace.clone(), names })
     }
 
@@ -100,11 +104,12 @@ fn type_name<M: RosMessage>() -> MessageTypeName {
 pub struct NodeNames(Arc<Mutex<BTreeMap<[u8; PARTICIPANT_BYTES], String>>>);
 
 impl NodeNames {
-    /// Receives the statements of all processes, in a thread of its own.
-    fn watch(&self, node: &Node) {
+    /// Receives the statements of all processes, in a thread of its own. It also signals each event of discovery.
+    fn watch(&self, node: &Node, first_requests: Sender<()>) {
         let (Some(events), names) = (node.status_receiver(), self.clone()) else { return };
         thread::spawn(move || {
             while let Ok(event) = events.recv_blocking() {
+                let _ = first_requests.send(());
                 let NodeEvent::ParticipantEntities(process) = event else { continue };
                 let nodes: Vec<_> = process.nodes().iter().map(|node| node.fully_qualified_name()).collect();
                 let mut names = names.0.lock().unwrap_or_else(PoisonError::into_inner);

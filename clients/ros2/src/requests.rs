@@ -3,10 +3,10 @@
 use std::thread;
 
 use futures::executor::block_on;
-use hexad::control::signals::state::Request;
-use hexad::operator::protocol::is_stop;
 use hexad_bridge::rejection::{Rejection, RejectionLog};
 use hexad_bridge::requests::carry_out_for;
+use hexad_client::operator::protocol::is_stop;
+use hexad_core::control::signals::state::Request;
 use ros2_client::Server;
 use tracing::{info, warn};
 

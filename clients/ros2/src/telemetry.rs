@@ -1,11 +1,11 @@
 //! Measured lengths, pose, twist and acceleration as messages of ROS 2.
 
-use hexad::config::Config;
-use hexad::control::signals::inputs::Measurement;
-use hexad::messages::{MeasuredMessage, StatusMessage};
-use hexad::model::inverse_geometry::{leg_lengths_and_rates, universal_joint_angles};
-use hexad::model::rigid::{Acceleration, Pose, Twist};
-use hexad::model::task::TaskState;
+use hexad_client::messages::{MeasuredMessage, StatusMessage};
+use hexad_core::control::signals::inputs::Measurement;
+use hexad_core::model::inverse_geometry::{leg_lengths_and_rates, universal_joint_angles};
+use hexad_core::model::rigid::{Acceleration, Pose, Twist};
+use hexad_core::model::task::TaskState;
+use hexad_machine::config::Config;
 use nalgebra::Vector6;
 
 use crate::conversion::{accel_message, pose_message, transform_message, twist_message};

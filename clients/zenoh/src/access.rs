@@ -24,9 +24,9 @@ pub fn request_key(machine: &str, client: &str, request: &str) -> String {
     format!("hexad/{machine}/request/{client}/{request}")
 }
 
-/// Key of the token that shows that a client is alive.
-pub fn client_token(machine: &str, client: &str) -> String {
-    format!("hexad/{machine}/client/{client}")
+/// Key of the token that shows that a session of a client is alive.
+pub fn session_token(machine: &str, client: &str, session: &str) -> String {
+    format!("hexad/{machine}/client/{client}/{session}")
 }
 
 /// Configuration of the session that listens.
@@ -105,9 +105,10 @@ fn own_rules(machine: &str, name: &str, client: &Client) -> Vec<Value> {
         names.extend(crate::motions::REQUESTS);
     }
     let keys: Vec<_> = names.iter().map(|request| request_key(machine, name, request)).collect();
+    let tokens = session_token(machine, name, "*");
     let mut rules = vec![
         rule(&format!("request {name}"), "ingress", &["query"], &keys),
-        rule(&format!("token {name}"), "ingress", &["liveliness_token"], &[client_token(machine, name)]),
+        rule(&format!("token {name}"), "ingress", &["liveliness_token"], &[tokens]),
     ];
     if client.setpoints {
         let id = format!("setpoint {name}");

@@ -3,14 +3,13 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-use hexad::commands::plant::prepare_thread;
-use hexad::config::Config;
-use hexad::messages::Bus;
-use hexad::messages::clock::monotonic_ns;
-use hexad::realtime::stop_request::Stop;
 use hexad_bridge::machine::join;
 use hexad_bridge::rejection::{Rejection, RejectionLog};
 use hexad_bridge::setpoint_relay::SetpointRelay;
+use hexad_client::messages::Bus;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_machine::config::Config;
 use tracing::info;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::{Session, Wait};
@@ -90,7 +89,7 @@ impl<'a> Bridge<'a> {
     pub fn run(mut self, stop: &Stop) {
         // Only this thread, which does little in each pass. A flood would keep threads of Zenoh busy, and if all real-time threads together
         // are, the kernel pauses them, the control loop with them.
-        prepare_thread(self.config);
+        self.config.deployment.realtime.prepare_peer_thread();
         info!("the bridge is open");
         while !stop.is_requested() {
             self.relay();

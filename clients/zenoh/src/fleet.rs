@@ -6,11 +6,11 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use hexad::control::signals::state::Request;
-use hexad::operator::protocol::{AnswerLine, RequestResult};
-use hexad::output::files::print;
-use hexad::output::numbers::significant;
-use hexad::output::text_table::{Left, Right, text_table};
+use hexad_client::operator::protocol::{AnswerLine, RequestResult};
+use hexad_core::control::signals::state::Request;
+use hexad_machine::text::files::print;
+use hexad_machine::text::numbers::significant;
+use hexad_machine::text::text_table::{Left, Right, text_table};
 use serde::Deserialize;
 use zenoh::Wait;
 

@@ -23,10 +23,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{ArgGroup, Parser, Subcommand};
-use hexad::commands::log::{self, LogFormat};
-use hexad::config::Config;
-use hexad::control::signals::state::Request;
-use hexad::realtime::stop_request::Stop;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::state::Request;
+use hexad_machine::config::Config;
+use hexad_machine::log::{self, LogFormat};
 use tracing_subscriber::Layer;
 
 use crate::access_log::{AccessLog, LIBRARY};
@@ -103,7 +103,7 @@ impl StopArguments {
 
 fn run(network: &Path, machine: &Path) -> Result<(), String> {
     let (access_log, refusals) = AccessLog::new();
-    log::install_beside(LogFormat::Text, LIBRARY, access_log.with_filter(access_log::events()));
+    let _log = log::install_beside(LogFormat::Text, LIBRARY, access_log.with_filter(access_log::events()));
     let place = network.display();
     let text = fs::read_to_string(network).map_err(|error| format!("{place}: {error}"))?;
     let file = NetworkFile::parse(&text, network)?;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use hexad::control::signals::state::Request;
 use hexad_bridge::requests::{STOPS, requests_of_names};
+use hexad_core::control::signals::state::Request;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 

@@ -2,14 +2,12 @@
 
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
-use std::time::{Duration, Instant};
 
-use hexad::control::signals::state::Request;
-use hexad::messages::MAX_REQUEST_AGE_NS;
-use hexad::operator::OperatorError;
-use hexad::operator::protocol::{AnswerLine, RequestResult, is_stop};
-use hexad::operator::requests::status;
 use hexad_bridge::requests::carry_out_for;
+use hexad_client::operator::OperatorError;
+use hexad_client::operator::protocol::{AnswerLine, RequestResult, is_stop};
+use hexad_client::operator::requests::status;
+use hexad_core::control::signals::state::Request;
 use tracing::{info, warn};
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
@@ -22,17 +20,10 @@ const MAX_WAITING: usize = 16;
 /// Queryables, and with them the requests that are served.
 pub type Served = Vec<Queryable<()>>;
 
-/// A query and the instant of its arrival.
-pub type ArrivedQuery = (Query, Instant);
-
 /// Queries with the name of a request, in the order of their arrival.
-pub fn queries(
-    session: &Session,
-    served: &mut Served,
-    key: String,
-) -> Result<Receiver<ArrivedQuery>, String> {
+pub fn queries(session: &Session, served: &mut Served, key: String) -> Result<Receiver<Query>, String> {
     let (send, queries) = sync_channel(MAX_WAITING);
-    let take = move |query| drop(send.try_send((query, Instant::now())));
+    let take = move |query| drop(send.try_send(query));
     let queryable = session.declare_queryable(key).callback(take).wait();
     served.push(queryable.map_err(|error| error.to_string())?);
     Ok(queries)
@@ -51,33 +42,28 @@ pub fn serve(
         let queries = queries(session, served, request_key(machine, client, request.name()))?;
         let (machine, client) = (machine.to_owned(), client.to_owned());
         thread::spawn(move || {
-            for (query, arrival) in queries {
-                let answer = answer(&machine, request, &client, arrival.elapsed());
+            for query in &queries {
+                let answer = answer(&machine, request, &client);
                 info!(remote = client, "{}: {}", request.name(), conclusion(&answer));
                 reply(&query, &answer);
+                // Those that arrived meanwhile have the same answer: none of them begins control later. Stops are carried out one by one.
+                if !is_stop(request) {
+                    queries.try_iter().for_each(|query| reply(&query, &answer));
+                }
             }
         });
     }
     let queries = queries(session, served, request_key(machine, client, "status"))?;
     let machine = machine.to_owned();
     thread::spawn(move || {
-        for (query, _) in queries {
+        for query in queries {
             reply(&query, &status(&machine).unwrap_or_else(|error| failure("status", &error)));
         }
     });
     Ok(())
 }
 
-fn answer(machine: &str, request: Request, client: &str, waited: Duration) -> AnswerLine {
-    // A stop is never too old, and nothing else begins control later.
-    if !is_stop(request) && waited > Duration::from_nanos(MAX_REQUEST_AGE_NS) {
-        let text = format!("it has waited {waited:.1?} for the request before: send it again");
-        return AnswerLine {
-            result: RequestResult::Stale,
-            request: request.name().into(),
-            ..AnswerLine::invalid(text)
-        };
-    }
+fn answer(machine: &str, request: Request, client: &str) -> AnswerLine {
     match carry_out_for(machine, request, client) {
         Ok(state) => AnswerLine {
             result: RequestResult::Done,

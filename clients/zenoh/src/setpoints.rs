@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use hexad::control::signals::inputs::{Setpoint, SetpointKind};
-use hexad::messages::layout::Declared;
-use hexad::messages::{Message, SetpointMessage};
-use hexad::model::task::TaskState;
-use hexad::recording::cdr;
 use hexad_bridge::rejection::Rejection;
 use hexad_bridge::setpoint_relay::SetpointRelay;
+use hexad_client::messages::cdr;
+use hexad_client::messages::layout::Declared;
+use hexad_client::messages::{Message, SetpointMessage};
+use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
+use hexad_core::model::task::TaskState;
 use zenoh::bytes::ZBytes;
 
 /// A setpoint as it has arrived.
@@ -79,9 +79,9 @@ impl<'a> Setpoints<'a> {
 
 #[cfg(test)]
 mod tests {
-    use hexad::config::Config;
-    use hexad::messages::Header;
-    use hexad::recording::cdr::CdrWriter;
+    use hexad_client::messages::Header;
+    use hexad_client::messages::cdr::CdrWriter;
+    use hexad_machine::config::Config;
 
     use super::*;
 

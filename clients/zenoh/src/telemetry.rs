@@ -2,12 +2,12 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use hexad::messages::layout::Declared;
-use hexad::messages::{
+use hexad_client::messages::cdr::CdrWriter;
+use hexad_client::messages::layout::Declared;
+use hexad_client::messages::{
     Bus, ForceMessage, MeasuredMessage, Message, StatisticsMessage, StatusMessage, Subscriber,
 };
-use hexad::model::task::TaskState;
-use hexad::recording::cdr::CdrWriter;
+use hexad_core::model::task::TaskState;
 use nalgebra::{Rotation3, UnitQuaternion};
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;

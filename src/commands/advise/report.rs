@@ -4,10 +4,10 @@ use core::fmt;
 
 use serde::Serialize;
 
-use crate::analysis::fidelity_choice::FidelityError;
-use crate::model::fidelity::Fidelity;
-use crate::output::numbers::{percent, plain_percent, significant};
-use crate::output::text_table::{Left, Right, text_table};
+use hexad_core::model::fidelity::Fidelity;
+use hexad_machine::analysis::fidelity_choice::FidelityError;
+use hexad_machine::text::numbers::{percent, plain_percent, significant};
+use hexad_machine::text::text_table::{Left, Right, text_table};
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 pub const SCHEMA: u32 = 1;

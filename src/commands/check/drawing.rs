@@ -7,15 +7,15 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::path::Path;
 
-use crate::model::LEGS;
-use crate::model::inverse_geometry::leg_lengths;
-use crate::model::machine::Machine;
-use crate::model::task::TaskState;
 use crate::output::axis::Axis;
 use crate::output::svg::{
     Area, ChartError, DrawError, GRID, INK, LABEL_SIZE, MARGIN, TITLE_HEIGHT, UNIT, X_LABELS, Y_LABELS,
     draw_title, house_style, palette, rgb, text, title_height, write_picture,
 };
+use hexad_core::model::LEGS;
+use hexad_core::model::inverse_geometry::leg_lengths;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::task::TaskState;
 
 const CELL_HEIGHT: i32 = 390 * UNIT;
 /// Approximate number of ticks on an axis.
@@ -251,7 +251,7 @@ fn whole(pixel: &Pixel) -> (i32, i32) {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::config::Config;
+    use hexad_machine::config::Config;
 
     #[test]
     fn views_are_not_mirrored_and_look_down_whatever_gravity_is() {

@@ -4,10 +4,10 @@ use core::fmt;
 
 use serde::Serialize;
 
-use crate::analysis::envelope::EnvelopeBounds;
-use crate::config::deployment::DeploymentLimits;
-use crate::control::signals::limits::{DerivativeLimits, Limits};
-use crate::output::numbers::significant;
+use hexad_core::control::signals::limits::{DerivativeLimits, Limits};
+use hexad_machine::analysis::envelope::EnvelopeBounds;
+use hexad_machine::config::deployment::DeploymentLimits;
+use hexad_machine::text::numbers::significant;
 
 /// Largest velocity, acceleration and jerk of all motions: `[limits]` times `limits.scale`.
 #[derive(Clone, Debug, Serialize)]
@@ -96,7 +96,7 @@ pub fn exceedable_ranges(envelope: &EnvelopeBounds, limits: &Limits) -> Vec<Exce
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
+    use hexad_machine::config::Config;
 
     #[test]
     fn ranges_below_the_scaled_limits_are_shown_with_the_key_to_change() {

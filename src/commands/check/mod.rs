@@ -6,7 +6,7 @@ use std::path::PathBuf;
 pub use self::report::CheckReport;
 use crate::commands::arguments::MachineFile;
 use crate::commands::failure::Failure;
-use crate::output::files::{print, print_json};
+use hexad_machine::text::files::{print, print_json};
 
 mod drawing;
 mod limits;

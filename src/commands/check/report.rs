@@ -3,20 +3,19 @@
 use serde::Serialize;
 
 use super::limits::{ExceedableRange, MotionLimits, exceedable_ranges};
-use crate::analysis::assembly_modes::other_modes;
-use crate::config::control_loops::{ControlLoop, longest_age_s, loops};
-use crate::config::deployment::default_limits::{DerivedLimit, derived_limits};
-use crate::config::examination::Examination;
-use crate::config::{Config, Violation};
-use crate::control::constants::Constants;
-use crate::daemon;
-use crate::model::LEGS;
-use crate::model::active_forces::inverse_dynamics;
-use crate::model::fidelity::{Exact, Fidelity};
-use crate::model::inverse_geometry::{leg_directions, leg_lengths};
-use crate::model::kinematic_state::KinematicState;
-use crate::model::task::TaskState;
-use crate::output::numbers::MotionDigits;
+use hexad_core::control::constants::Constants;
+use hexad_core::model::LEGS;
+use hexad_core::model::active_forces::inverse_dynamics;
+use hexad_core::model::fidelity::{Exact, Fidelity};
+use hexad_core::model::inverse_geometry::{leg_directions, leg_lengths};
+use hexad_core::model::kinematic_state::KinematicState;
+use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::assembly_modes::other_modes;
+use hexad_machine::config::control_loops::{ControlLoop, longest_age_s, loops};
+use hexad_machine::config::deployment::default_limits::{DerivedLimit, derived_limits};
+use hexad_machine::config::examination::Examination;
+use hexad_machine::config::{Config, Violation};
+use hexad_machine::text::numbers::MotionDigits;
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
@@ -44,6 +43,8 @@ pub struct CheckReport {
     pub certain_step_rad: f64,
     /// Other poses with the same lengths, and the nearest.
     pub other_poses: usize,
+    /// Those of them that the joints permit: a start at home asks in which the platform stands.
+    pub permitted_other_poses: usize,
     pub nearest_pose: Option<OtherPose>,
     /// Limits that the reference keeps.
     pub motion_limits: MotionLimits,
@@ -90,7 +91,7 @@ pub struct LegAtHome {
 pub struct OtherPose {
     pub text: String,
     /// Whether it may be confused with home at start-up.
-    pub is_nearby: bool,
+    pub is_confusable: bool,
 }
 
 /// Margins of a control loop.
@@ -117,7 +118,8 @@ impl CheckReport {
         let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
         let masses = &control.leg_masses;
         let leg_modes_hz = [root(masses.softest_mode_gain), root(masses.stiffest_mode_gain)];
-        let constants = Constants::new(machine, daemon::parameters(machine, deployment, Fidelity::Exact));
+        let constants =
+            Constants::new(machine, hexad_daemon::parameters(machine, deployment, Fidelity::Exact));
         Self {
             schema: SCHEMA,
             machine: name.clone(),
@@ -132,9 +134,12 @@ impl CheckReport {
             certain_step_m: sensitivity.trusted_step * machine.joints.radius,
             certain_step_rad: sensitivity.trusted_step,
             other_poses: others.len(),
+            permitted_other_poses: others.iter().filter(|mode| mode.is_permitted).count(),
             nearest_pose: others
-                .first()
-                .map(|mode| OtherPose { text: mode.to_string(), is_nearby: mode.is_nearby() }),
+                .iter()
+                .find(|mode| mode.is_confusable())
+                .or_else(|| others.first())
+                .map(|mode| OtherPose { text: mode.to_string(), is_confusable: mode.is_confusable() }),
             motion_limits: MotionLimits::new(limits),
             exceedable_ranges: deployment
                 .envelope

@@ -4,9 +4,9 @@ use core::f64::consts::LN_2;
 use core::fmt;
 
 use super::report::{CheckReport, LegAtHome};
-use crate::model::sensitivity::CONDITION_MEANING;
-use crate::output::numbers::{MotionDigits, fixed, significant};
-use crate::output::text_table::{Right, text_table};
+use hexad_core::model::sensitivity::CONDITION_MEANING;
+use hexad_machine::text::numbers::{MotionDigits, fixed, significant};
+use hexad_machine::text::text_table::{Right, text_table};
 
 impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -100,10 +100,18 @@ impl CheckReport {
         };
         let count = self.other_poses;
         writeln!(f, "other poses with these lengths    {count} found, the nearest {}", nearest.text)?;
-        if nearest.is_nearby {
+        if nearest.is_confusable {
             writeln!(
                 f,
-                "WARNING: at start-up the lengths alone may not distinguish it from home; choose a home further away from it"
+                "WARNING: at start-up the lengths alone may not distinguish it from home; choose a home further away from it, or \
+                 see at each start that the platform is where it is taken to be"
+            )?;
+        }
+        if self.permitted_other_poses > 0 {
+            let count = self.permitted_other_poses;
+            writeln!(
+                f,
+                "WARNING: home.max_rotation_deg permits {count} of them: control begins at home only after hexad engage --pose N"
             )?;
         }
         Ok(())
@@ -113,8 +121,8 @@ impl CheckReport {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
-    use crate::config::examination::Examination;
+    use hexad_machine::config::Config;
+    use hexad_machine::config::examination::Examination;
 
     const TELESCOPE: &str = include_str!("../../../tests/data/telescope_m2.toml");
 

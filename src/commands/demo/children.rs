@@ -7,9 +7,9 @@ use std::thread::sleep;
 use std::time::Instant;
 use std::{env, io};
 
-use crate::commands::log::{FILTER_VARIABLES, FORMAT_VARIABLE, format_name};
-use crate::daemon::CONFIGURATION_LOG;
-use crate::realtime::process::terminate;
+use hexad_client::realtime::process::terminate;
+use hexad_daemon::CONFIGURATION_LOG;
+use hexad_machine::log::{FILTER_VARIABLES, FORMAT_VARIABLE, format_name};
 
 /// Environment variable with the process ID of the parent. A child stops when that process dies.
 pub const PARENT_VARIABLE: &str = "HEXAD_PARENT";

@@ -12,22 +12,22 @@ use tracing::warn;
 use self::children::ChildProcess;
 use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
-use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, duration};
+use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, built_in_motion, duration};
 use super::failure::{CommandError, Failure};
 use super::in_step::Operator;
 use super::progress::time_bar;
 use super::report::{self, ReportError, recordings_in};
-use crate::config::text::read_file;
-use crate::config::{Config, ConfigError};
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::state::{Request, State};
-use crate::daemon::report::Report;
-use crate::messages::PortError;
-use crate::motion::built_in::BuiltInMotion;
-use crate::output::files::{FileError, print, write_whole};
 use crate::output::svg::ChartError;
-use crate::realtime::stop_request::Stop;
-use crate::recording::RecordingError;
+use hexad_client::messages::PortError;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::{Request, State};
+use hexad_core::motion::built_in::BuiltInMotion;
+use hexad_daemon::recording::RecordingError;
+use hexad_daemon::report::Report;
+use hexad_machine::config::text::read_file;
+use hexad_machine::config::{Config, ConfigError};
+use hexad_machine::text::files::{FileError, print, write_whole};
 
 pub mod children;
 mod pictures;
@@ -65,7 +65,7 @@ pub struct DemoArguments {
     #[arg(long, value_name = "FILE")]
     plant_config: Option<PathBuf>,
     /// The motion to make
-    #[arg(long, value_enum, default_value_t = BuiltInMotion::Paper)]
+    #[arg(long, value_parser = built_in_motion(), default_value = BuiltInMotion::Paper.name())]
     motion: BuiltInMotion,
     /// Length of the motion [s]; approach and settling come on top
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true)]

@@ -5,15 +5,15 @@ use std::path::Path;
 use nalgebra::Vector6;
 
 use super::recording::{Recording, desired_motion, measured_pose};
-use crate::config::Config;
-use crate::control::signals::time::seconds_between;
-use crate::model::LEGS;
-use crate::model::active_forces::InverseDynamics;
-use crate::model::fidelity::Exact;
-use crate::model::inverse_geometry::leg_motion;
 use crate::output::axis::{need_own_axes, range_of};
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use crate::output::svg::ChartError;
+use hexad_core::control::signals::time::seconds_between;
+use hexad_core::model::LEGS;
+use hexad_core::model::active_forces::InverseDynamics;
+use hexad_core::model::fidelity::Exact;
+use hexad_core::model::inverse_geometry::leg_motion;
+use hexad_machine::config::Config;
 
 /// Values of six coordinates over time.
 type Lines = [Vec<(f64, f64)>; LEGS];

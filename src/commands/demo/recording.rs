@@ -1,12 +1,12 @@
 //! Recording of the topics during a demonstration, and its tracking error.
 
-use crate::control::signals::inputs::Setpoint;
-use crate::control::signals::time::seconds_between;
-use crate::daemon::report::TrackingSum;
-use crate::messages::{Bus, PortError, Subscriber};
-use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage};
-use crate::model::rigid::{Motion, Pose};
-use crate::model::task::TaskState;
+use hexad_client::messages::{Bus, PortError, Subscriber};
+use hexad_client::messages::{ForceMessage, MeasuredMessage, SetpointMessage};
+use hexad_core::control::signals::inputs::Setpoint;
+use hexad_core::control::signals::time::seconds_between;
+use hexad_core::model::rigid::{Motion, Pose};
+use hexad_core::model::task::TaskState;
+use hexad_daemon::report::TrackingSum;
 
 /// Messages kept between two polls: the full capacity of the topic.
 const TOPIC_DEPTH: usize = usize::MAX;

@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use crate::daemon::report::Report;
-use crate::messages::{Times, WorstCycle};
-use crate::output::text_table::{Left, Right, text_table};
+use hexad_client::messages::{Times, WorstCycle};
+use hexad_daemon::report::Report;
+use hexad_machine::text::text_table::{Left, Right, text_table};
 
 /// Tracking, timing and faults of a run. Displays as text.
 pub struct Summary<'a> {

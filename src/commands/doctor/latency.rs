@@ -14,17 +14,17 @@ use serde::{Deserialize, Serialize};
 
 use super::files::HostFiles;
 use crate::commands::progress::time_bar;
-use crate::config::deployment::{Deployment, Realtime};
-use crate::daemon::start::prepare_loop;
-use crate::daemon::time_histogram::TimeHistogram;
-use crate::daemon::{nanoseconds, timing};
-use crate::messages::Times;
-use crate::messages::clock::monotonic_ns;
-use crate::realtime::clock::{Grid, Monotonic};
-use crate::realtime::cyclic::{ReleaseMode, Timing};
-use crate::realtime::stop_request::Stop;
-use crate::realtime::usage::ThreadUsage;
-use crate::realtime::waiter::Waiter;
+use hexad_client::messages::Times;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::realtime::clock::{Grid, Monotonic};
+use hexad_client::realtime::cyclic::{ReleaseMode, Timing};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_client::realtime::usage::ThreadUsage;
+use hexad_client::realtime::waiter::Waiter;
+use hexad_daemon::start::prepare_loop;
+use hexad_daemon::time_histogram::TimeHistogram;
+use hexad_daemon::{nanoseconds, timing};
+use hexad_machine::config::deployment::{Deployment, Realtime};
 
 /// Rates measured in addition to the configured one, for slow and fast drives.
 const RATES_HZ: [f64; 5] = [250.0, 1000.0, 4000.0, 10_000.0, 20_000.0];
@@ -211,7 +211,7 @@ fn stolen_ms(host: &HostFiles, cpu: Option<usize>) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::commands::doctor::files::sample::host;
-    use crate::config::Config;
+    use hexad_machine::config::Config;
 
     fn configured(section: &str) -> Deployment {
         let text = format!("{}\n[realtime]\n{section}", include_str!("../../../config/fried2008.toml"));

@@ -1,8 +1,8 @@
 //! Controllers that run on this host, which a measurement would delay.
 
 use super::files::HostFiles;
-use crate::daemon::REALTIME_THREAD;
-use crate::realtime::setup::cpus::Cpus;
+use hexad_client::realtime::setup::cpus::Cpus;
+use hexad_daemon::REALTIME_THREAD;
 
 /// Processes with a real-time thread of the daemon that may run on a processor, or on any if `cpu` is `None`.
 pub fn controllers(host: &HostFiles, cpu: Option<usize>) -> Vec<u32> {

@@ -6,8 +6,8 @@ use super::Diagnosis;
 use super::facts::{Assessment, Fact, surroundings};
 use super::latency::{Latency, measured_mode};
 use super::verdict::{Feasibility, RateVerdict};
-use crate::config::deployment::Realtime;
-use crate::output::text_table::{DEFAULT_WIDTH, Left, Right, paragraph, stdout_width, text_table};
+use hexad_machine::config::deployment::Realtime;
+use hexad_machine::text::text_table::{DEFAULT_WIDTH, Left, Right, paragraph, stdout_width, text_table};
 
 /// Widths of the columns of the facts: assessment and name.
 const ASSESSMENT_WIDTH: usize = 9;
@@ -177,10 +177,10 @@ fn notes(diagnosis: &Diagnosis) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::config::Config;
-    use crate::messages::Times;
-    use crate::realtime::cyclic::ReleaseMode;
-    use crate::realtime::usage::ThreadUsage;
+    use hexad_client::messages::Times;
+    use hexad_client::realtime::cyclic::ReleaseMode;
+    use hexad_client::realtime::usage::ThreadUsage;
+    use hexad_machine::config::Config;
 
     const RARE: u64 = 123_456_789;
 

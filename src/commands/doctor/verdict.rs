@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::latency::Latency;
 use super::text::microseconds;
-use crate::messages::Times;
+use hexad_client::messages::Times;
 
 /// Largest 99.9th percentile of a good rate, as a share of the period. The rest is for reading, computing and
 /// sending.
@@ -149,8 +149,8 @@ fn milliseconds(time_ns: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::realtime::cyclic::ReleaseMode;
-    use crate::realtime::usage::ThreadUsage;
+    use hexad_client::realtime::cyclic::ReleaseMode;
+    use hexad_client::realtime::usage::ThreadUsage;
 
     const MAX_HOLD_NS: u64 = 20_000_000;
 

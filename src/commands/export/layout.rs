@@ -4,10 +4,10 @@ use core::fmt;
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 
-use crate::model::LEGS;
-use crate::model::inverse_geometry::{leg_directions, leg_lengths};
-use crate::model::machine::{Link, Machine, TransverseInertia};
-use crate::model::rigid::Pose;
+use hexad_core::model::LEGS;
+use hexad_core::model::inverse_geometry::{leg_directions, leg_lengths};
+use hexad_core::model::machine::{Link, Machine, TransverseInertia};
+use hexad_core::model::rigid::Pose;
 
 /// Least difference between the greatest principal moment and the sum of the others, as a share of the
 /// former. For flat plates it is zero. Rounding may make it negative, and engines reject that.
@@ -159,9 +159,9 @@ mod tests {
     use nalgebra::Unit;
 
     use super::*;
-    use crate::config::Config;
-    use crate::model::inverse_geometry::universal_joint_angles;
-    use crate::model::task::pose_of;
+    use hexad_core::model::inverse_geometry::universal_joint_angles;
+    use hexad_core::model::task::pose_of;
+    use hexad_machine::config::Config;
 
     /// The chain of joints of a leg, as a reader of the exported file computes it, ends at the joint of the platform.
     #[test]

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::layout::{LegLayout, Numbers, Shapes, home, legs, link_inertia, quaternion, realizable};
-use crate::config::Config;
-use crate::model::machine::{Link, Machine};
-use crate::model::rigid::Pose;
+use hexad_core::model::machine::{Link, Machine};
+use hexad_core::model::rigid::Pose;
+use hexad_machine::config::Config;
 
 /// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
 const STEP_S: f64 = 1e-4;

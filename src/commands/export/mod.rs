@@ -38,8 +38,8 @@ use clap::{Args, ValueEnum};
 
 use super::arguments::MachineFile;
 use super::failure::Failure;
-use crate::config::Config;
-use crate::output::files::{print, write_whole};
+use hexad_machine::config::Config;
+use hexad_machine::text::files::{print, write_whole};
 
 mod layout;
 mod mjcf;

@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::layout::{LegLayout, Numbers, Shapes, home, legs, link_inertia, realizable};
-use crate::config::Config;
-use crate::model::machine::Machine;
-use crate::model::rigid::Pose;
-use crate::model::task::task_coordinates;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::rigid::Pose;
+use hexad_core::model::task::task_coordinates;
+use hexad_machine::config::Config;
 
 const HEADER_COMMENT: &str = "  Written by `hexad export`. SI units and radians. The link base is the base frame of the configuration.
   Legs i = 1 to 6. URDF has no closed loops: the reader of this file must make the frames ball_rod_i and

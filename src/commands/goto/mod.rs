@@ -12,18 +12,18 @@ use super::failure::Failure;
 use super::frame_options::FrameOptions;
 use super::motion_client::MotionClient;
 use super::quantity::length_within;
-use crate::config::Config;
-use crate::daemon::constants;
-use crate::daemon::motion_requests::order::GotoOrder;
-use crate::daemon::motion_requests::plan::{GotoPlan, window};
-use crate::daemon::target_source::Observation;
-use crate::operator::motion_fields::{GOTO, TargetFields};
-use crate::operator::protocol::{AnswerLine, RequestLine};
-use crate::operator::requests::status;
-use crate::output::coordinate_rows::{heading, row};
-use crate::output::files::print;
-use crate::output::numbers::MotionDigits;
-use crate::realtime::stop_request::Stop;
+use hexad_client::operator::motion_fields::{GOTO, TargetFields};
+use hexad_client::operator::protocol::{AnswerLine, RequestLine};
+use hexad_client::operator::requests::status;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_daemon::constants;
+use hexad_daemon::motion_requests::order::GotoOrder;
+use hexad_daemon::motion_requests::plan::{GotoPlan, window};
+use hexad_daemon::target_source::Observation;
+use hexad_machine::config::Config;
+use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::files::print;
+use hexad_machine::text::numbers::MotionDigits;
 
 mod plan;
 mod pose_options;
@@ -118,7 +118,7 @@ impl GotoArguments {
             tolerance_m: self.tolerance,
         };
         let is_straight = self.frames.tool.is_some();
-        let plan = GotoPlan::new(config, &constants, &order, &coordinates, is_straight, &seen)?;
+        let plan = GotoPlan::new(config, &constants, &order, &coordinates, is_straight, &seen, || true)?;
         Ok(print(PlanText {
             plan: &plan,
             window: &window(config, self.tolerance),

@@ -2,14 +2,14 @@
 
 use core::fmt;
 
-use crate::config::coordinates::Coordinates;
-use crate::control::constants::Constants;
-use crate::control::signals::limits::Limit;
-use crate::control::supervision::in_position::InPositionWindow;
-use crate::daemon::motion_requests::plan::GotoPlan;
-use crate::model::LEGS;
-use crate::output::coordinate_rows::{heading, row};
-use crate::output::numbers::{MotionDigits, fixed, percent, significant};
+use hexad_core::control::constants::Constants;
+use hexad_core::control::signals::limits::Limit;
+use hexad_core::control::supervision::in_position::InPositionWindow;
+use hexad_core::model::LEGS;
+use hexad_daemon::motion_requests::plan::GotoPlan;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::numbers::{MotionDigits, fixed, percent, significant};
 
 /// Plan as text.
 pub struct PlanText<'a> {

@@ -10,11 +10,11 @@ use self::report::{Delay, IdentificationReport, predicted};
 use super::failure::{CommandError, Failure};
 use super::machine_file::{changed_margins, difference, edited, write_new};
 use super::quantity::{length, list};
-use crate::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
-use crate::analysis::identification::{Load, Run, identify, samples};
-use crate::config::Config;
-use crate::model::machine::Machine;
-use crate::output::files::{print, print_json, write_whole};
+use hexad_core::model::machine::Machine;
+use hexad_machine::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
+use hexad_machine::analysis::identification::{Load, Run, identify, samples};
+use hexad_machine::config::Config;
+use hexad_machine::text::files::{print, print_json, write_whole};
 
 mod new_values;
 mod page;

@@ -3,13 +3,13 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::report::Delay;
-use crate::analysis::identification::Identification;
 use crate::commands::machine_file::{Estimate, NewNumbers, NewValue};
-use crate::model::LEGS;
-use crate::model::active_forces::inverse_dynamics;
-use crate::model::fidelity::Gravity;
-use crate::model::machine::{Link, Machine, Platform};
-use crate::model::task::TaskState;
+use hexad_core::model::LEGS;
+use hexad_core::model::active_forces::inverse_dynamics;
+use hexad_core::model::fidelity::Gravity;
+use hexad_core::model::machine::{Link, Machine, Platform};
+use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::identification::Identification;
 
 /// Friction that the new file may still lack: this ratio of the largest dry friction at home, for stiction, and so many RMS
 /// residuals.

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::report::{IdentificationReport, Row};
-use crate::analysis::identification::{Run, predictions};
 use crate::commands::report::head::{LevelHead, json};
 use crate::commands::report::summary::Fact;
-use crate::model::LEGS;
-use crate::model::machine::Machine;
 use crate::output::page::{PageKind, page};
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::Machine;
+use hexad_machine::analysis::identification::{Run, predictions};
 
 /// Longest time of motions that a page shows \[s\], as half a megabyte.
 const MAX_SHOWN_S: f64 = 300.0;

@@ -1,9 +1,9 @@
 //! Quantities that the identification shows: keys of the machine file, and combinations that are known better than their
 //! parts.
 
-use crate::model::LEGS;
-use crate::model::machine::{Machine, Platform};
-use crate::model::regressor::VISCOUS;
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::{Machine, Platform};
+use hexad_core::model::regressor::VISCOUS;
 
 /// A number of machine and payload.
 pub(super) struct Quantity {

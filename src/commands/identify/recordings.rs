@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use super::IdentifyError;
-use crate::analysis::drive_delay::{MeasuredMotion, RecordedStretch};
-use crate::analysis::force_integrals::SentForce;
 use crate::commands::failure::Failure;
-use crate::config::Config;
-use crate::messages::CycleMessage;
-use crate::model::LEGS;
-use crate::recording::Item;
-use crate::recording::reader::Recording;
+use hexad_client::messages::CycleMessage;
+use hexad_core::model::LEGS;
+use hexad_daemon::recording::Item;
+use hexad_daemon::recording::reader::Recording;
+use hexad_machine::analysis::drive_delay::{MeasuredMotion, RecordedStretch};
+use hexad_machine::analysis::force_integrals::SentForce;
+use hexad_machine::config::Config;
 
 /// Stretches of recordings, and the configuration of the newest recording.
 #[derive(Default)]
@@ -33,11 +33,13 @@ impl Recorded {
 
     fn read_one(&mut self, path: &Path) -> Result<Vec<RecordedStretch>, Failure> {
         let mut reader = StretchReader::default();
-        let summary = Recording::open(path)?.each(|item| match item {
+        let recording = Recording::open(path)?;
+        let summary = recording.each(|item| match item {
             Item::Cycle(cycle) => reader.add(&cycle),
             Item::Gap(_) => reader.end(),
             Item::Memory { .. } => {}
         })?;
+        recording.remark(&summary);
         reader.end();
         let text = summary.info.configuration;
         let config = Config::parse(&text, "configuration of the recording")?;

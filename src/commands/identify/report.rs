@@ -5,14 +5,14 @@ use core::fmt;
 use serde::Serialize;
 
 use super::quantities::{BODIES, LEG_QUANTITIES, PAYLOAD, Quantity, base_parameter};
-use crate::analysis::drive_delay::DriveDelay;
-use crate::analysis::identification::{Estimated, Identification, Load, Run, prediction_errors};
 use crate::commands::report::summary::Fact;
-use crate::config::Config;
-use crate::model::LEGS;
-use crate::model::machine::{Machine, Platform};
-use crate::output::numbers::significant;
-use crate::output::text_table::{Left, MAX_WIDTH, Right, paragraph, text_table};
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::{Machine, Platform};
+use hexad_machine::analysis::drive_delay::DriveDelay;
+use hexad_machine::analysis::identification::{Estimated, Identification, Load, Run, prediction_errors};
+use hexad_machine::config::Config;
+use hexad_machine::text::numbers::significant;
+use hexad_machine::text::text_table::{Left, MAX_WIDTH, Right, paragraph, text_table};
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;

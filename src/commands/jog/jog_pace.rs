@@ -1,8 +1,8 @@
 //! Velocity or step of a jog by keys.
 
 use super::keys::Key;
-use crate::config::Config;
-use crate::output::numbers::MotionDigits;
+use hexad_machine::config::Config;
+use hexad_machine::text::numbers::MotionDigits;
 
 /// Velocities, as shares of the velocity of autonomous motions.
 const SHARES: [f64; 7] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];

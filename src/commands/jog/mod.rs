@@ -17,11 +17,11 @@ use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
 use super::frame_options::FrameOptions;
 use super::motion_client::{MotionClient, MotionError};
-use crate::config::coordinates::Coordinates;
-use crate::operator::motion_fields::{GOTO, HOLD, JOG, RateFields, TargetFields};
-use crate::operator::protocol::{RequestLine, RequestResult};
-use crate::output::files::print;
-use crate::realtime::stop_request::Stop;
+use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG, RateFields, TargetFields};
+use hexad_client::operator::protocol::{RequestLine, RequestResult};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::files::print;
 
 mod jog_pace;
 mod keys;

@@ -5,9 +5,9 @@ use core::fmt;
 use super::jog_pace::Pace;
 use super::keys::Key;
 use crate::commands::status::screen::{legs, poses};
-use crate::config::coordinates::Coordinates;
-use crate::operator::protocol::AnswerLine as Answer;
-use crate::output::numbers::{AXES, significant};
+use hexad_client::operator::protocol::AnswerLine as Answer;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::numbers::{AXES, significant};
 
 /// Content of the screen.
 pub struct JogScreen<'a> {
@@ -68,7 +68,7 @@ mod tests {
     use crate::commands::arguments::DEFAULT_CONFIG;
     use crate::commands::jog::jog_pace::JogPace;
     use crate::commands::status::screen::tests::answer;
-    use crate::config::Config;
+    use hexad_machine::config::Config;
 
     #[test]
     fn it_fits_the_smallest_terminal() {

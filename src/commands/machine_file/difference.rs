@@ -1,7 +1,7 @@
 //! Differences between two machine files, for a terminal.
 
 use crate::commands::check::CheckReport;
-use crate::config::Config;
+use hexad_machine::config::Config;
 
 /// The lines that differ, each with its number: `-` for lines of the old text, `+` for lines of the new text.
 pub fn difference(old: &str, new: &str) -> String {

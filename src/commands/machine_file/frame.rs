@@ -4,7 +4,7 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::{Edits, MachineFileError, array, parsed};
-use crate::config::frames::NamedFrame;
+use hexad_machine::config::frames::NamedFrame;
 
 /// Decimals of angles \[rad\] and positions \[m\]: less than any machine can be placed or measured.
 const DECIMALS: i32 = 12;
@@ -43,7 +43,7 @@ fn number(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::frames::FrameKind;
+    use hexad_machine::config::frames::FrameKind;
 
     fn frame(name: &str) -> NamedFrame {
         let x = [1e-9, -2e-15, 0.0, 0.1, -0.25, 0.135_012_345_678_9];

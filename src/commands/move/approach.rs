@@ -2,8 +2,8 @@
 
 use nalgebra::Vector6;
 
-use crate::control::signals::limits::{DerivativeLimits, Limits};
-use crate::motion::minimum_jerk::shortest_duration;
+use hexad_core::control::signals::limits::{DerivativeLimits, Limits};
+use hexad_core::motion::minimum_jerk::shortest_duration;
 
 /// Share of each limit that the approach uses. The rest is for angles that change at the same time and add
 /// up.
@@ -25,10 +25,10 @@ pub(super) fn approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::config::Config;
-    use crate::daemon::precheck::Precheck;
-    use crate::model::task::TaskState;
-    use crate::motion::timeline::Timeline;
+    use hexad_core::model::task::TaskState;
+    use hexad_core::motion::timeline::Timeline;
+    use hexad_daemon::precheck::Precheck;
+    use hexad_machine::config::Config;
 
     /// Long approach with large angles, under limits of which each is active once. A quarter of the duration
     /// would exceed them.

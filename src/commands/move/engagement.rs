@@ -5,19 +5,32 @@ use std::time::{Duration, Instant};
 
 use super::MoveError;
 use crate::commands::request::carry_out_in_background;
-use crate::config::Config;
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::state::{MessageId, Request};
-use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
-use crate::operator::{OperatorError, Order};
-use crate::realtime::stop_request::Stop;
+use hexad_client::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
+use hexad_client::operator::requests::StopBaseline;
+use hexad_client::operator::{OperatorError, Order};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::{MessageId, Request};
+use hexad_machine::config::Config;
+
+/// Time between two looks whether a stop came while the request waits here.
+const STOP_CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Request for control in progress.
 pub enum Engagement {
     /// Another process engages.
     None,
     /// Request over the control socket, sent by a separate thread.
-    Socket { config: Box<Config>, began: Instant, within: Duration, stop: Stop, result: Option<Outcome> },
+    Socket {
+        machine: String,
+        baseline: StopBaseline,
+        /// When it was last looked whether a stop came.
+        checked: Instant,
+        began: Instant,
+        within: Duration,
+        stop: Stop,
+        result: Option<Outcome>,
+    },
     /// Request in step with the setpoints, in simulated time, which begins with the first wait; `sent` is the last one.
     InStep {
         commands: Publisher<CommandMessage>,
@@ -32,8 +45,8 @@ type Outcome = Receiver<Result<(), OperatorError>>;
 impl Engagement {
     /// Request over the control socket.
     pub fn over_socket(config: &Config, within: Duration, stop: &Stop) -> Self {
-        let (config, stop) = (Box::new(config.clone()), stop.clone());
-        Self::Socket { config, began: Instant::now(), within, stop, result: None }
+        let (machine, baseline, now) = (config.name.clone(), StopBaseline::now(&config.name), Instant::now());
+        Self::Socket { machine, baseline, checked: now, began: now, within, stop: stop.clone(), result: None }
     }
 
     /// Request in step with the setpoints.
@@ -51,11 +64,17 @@ impl Engagement {
         }
     }
 
-    /// Error if the time has passed before the request could be sent, or in step with the setpoints before control began.
-    /// `reason` says why.
+    /// Error if the time has passed, or a stop has come, before the request could be sent, or in step with the setpoints before
+    /// control began. `reason` says why it was not sent.
     pub fn check_time(&mut self, now_ns: u64, reason: &str) -> Result<(), MoveError> {
         let (elapsed, within) = match self {
-            Self::Socket { began, within, result: None, .. } => (began.elapsed(), *within),
+            Self::Socket { machine, baseline, checked, began, within, result: None, .. } => {
+                if checked.elapsed() > STOP_CHECK_INTERVAL {
+                    *checked = Instant::now();
+                    baseline.check(machine)?;
+                }
+                (began.elapsed(), *within)
+            }
             Self::InStep { began_ns, within, .. } => {
                 let began_ns = *began_ns.get_or_insert(now_ns);
                 (Duration::from_nanos(now_ns.saturating_sub(began_ns)), *within)
@@ -72,12 +91,12 @@ impl Engagement {
     pub fn request(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
         match self {
             Self::None => Ok(()),
-            Self::Socket { config, began, within, stop, result } => {
+            Self::Socket { machine, baseline, began, within, stop, result, .. } => {
                 let result = result.get_or_insert_with(|| {
                     let rest = within.saturating_sub(began.elapsed());
-                    let order =
-                        Order { request: Request::Engage, is_patient: true, timeout: rest, remote: None };
-                    carry_out_in_background(&config.name, order, stop)
+                    let baseline = Some(*baseline);
+                    let order = Order { is_patient: true, baseline, ..Order::new(Request::Engage, rest) };
+                    carry_out_in_background(machine, order, stop)
                 });
                 match result.try_recv() {
                     Ok(outcome) => Ok(outcome?),

@@ -21,28 +21,27 @@ use self::engagement::Engagement;
 use self::playback::{Playback, PlaybackStep};
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use self::udp::StreamOptions;
-use super::arguments::{GROUP_HELP, MachineFile, duration};
+use super::arguments::{GROUP_HELP, MachineFile, built_in_motion, duration};
 use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
 use super::frame_options::FrameOptions;
 use super::orientation::{OrientationFormat, ROTATION_HELP};
-use super::plant::prepare_thread;
-use crate::config::Config;
-use crate::control::signals::diagnostic::Diagnostic;
-use crate::control::signals::state::State;
-use crate::daemon::nanoseconds;
-use crate::daemon::precheck::SetpointRefusal;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::lockstep::poll_until;
-use crate::messages::{MeasuredMessage, SetpointMessage};
-use crate::messages::{PortError, Publisher, Subscriber};
-use crate::model::task::TaskState;
-use crate::motion::built_in::BuiltInMotion;
-use crate::operator::OperatorError;
-use crate::output::csv_table::{GROUPS, TableError};
-use crate::output::numbers::percent;
-use crate::realtime::clock::{Grid, sleep_until};
-use crate::realtime::pause_signals::PauseRequest;
-use crate::realtime::stop_request::Stop;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::lockstep::poll_until;
+use hexad_client::messages::{MeasuredMessage, SetpointMessage};
+use hexad_client::messages::{PortError, Publisher, Subscriber};
+use hexad_client::operator::OperatorError;
+use hexad_client::realtime::clock::{Grid, sleep_until};
+use hexad_client::realtime::pause_signals::PauseRequest;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::diagnostic::Diagnostic;
+use hexad_core::control::signals::state::State;
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::built_in::BuiltInMotion;
+use hexad_daemon::nanoseconds;
+use hexad_daemon::precheck::SetpointRefusal;
+use hexad_machine::config::Config;
+use hexad_machine::text::csv_table::{GROUPS, TableError};
+use hexad_machine::text::numbers::percent;
 
 mod approach;
 mod engagement;
@@ -107,7 +106,7 @@ impl PlaybackOptions {
 #[group(required = true, multiple = false)]
 struct TrajectorySource {
     /// A built-in motion
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = built_in_motion())]
     motion: Option<BuiltInMotion>,
     /// A CSV file with t and X, or t, X, X', X''; `-` is standard input
     ///
@@ -259,7 +258,7 @@ fn run_in_real_time(
     stop: &Stop,
 ) -> Result<(), MoveError> {
     let pause = PauseRequest::on_signals()?;
-    prepare_thread(config);
+    config.deployment.realtime.prepare_peer_thread();
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
     let mut has_begun = false;

@@ -1,10 +1,10 @@
 //! Path of a played motion: its timeline, and the point at which it continues after a pause.
 
 use super::trajectory::Trajectory;
-use crate::control::signals::limits::Limits;
-use crate::daemon::rate_change::RateChange;
-use crate::model::task::TaskState;
-use crate::motion::timeline::Timeline;
+use hexad_core::control::signals::limits::Limits;
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::timeline::Timeline;
+use hexad_daemon::rate_change::RateChange;
 
 /// Timeline played from its beginning, or from rest at an instant.
 #[derive(Clone, Copy, Debug)]
@@ -46,9 +46,9 @@ impl Path {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::config::Config;
-    use crate::daemon::precheck::Precheck;
-    use crate::motion::built_in::BuiltInMotion;
+    use hexad_core::motion::built_in::BuiltInMotion;
+    use hexad_daemon::precheck::Precheck;
+    use hexad_machine::config::Config;
 
     /// At every instant of a motion near its limits, the daemon's own rules accept the path to rest and the
     /// continuation.

@@ -12,11 +12,11 @@ use nix::unistd::Pid;
 use tracing::info;
 
 use super::MoveError;
-use crate::config::Config;
-use crate::daemon::process_names::named;
-use crate::operator::protocol::AnswerLine as Answer;
-use crate::operator::requests::status;
-use crate::realtime::pause_signals::{handles_pause, pause_signal};
+use hexad_client::operator::protocol::AnswerLine as Answer;
+use hexad_client::operator::requests::status;
+use hexad_client::realtime::pause_signals::{handles_pause, pause_signal};
+use hexad_daemon::process_names::named;
+use hexad_machine::config::Config;
 
 /// Time for which the setpoint must not change to count as at rest.
 const REST_TIME: Duration = Duration::from_millis(300);

@@ -8,23 +8,24 @@ use super::approach::approach_s;
 use super::engagement::Engagement;
 use super::path::Path;
 use super::trajectory::Trajectory;
-use crate::config::Config;
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::inputs::{Setpoint, SetpointKind};
-use crate::control::signals::limits::Limits;
-use crate::control::signals::state::State;
-use crate::daemon::rate_change::RateChange;
-use crate::daemon::target_source::held_x;
-use crate::messages::{StatusMessage, Subscriber};
-use crate::model::task::TaskState;
-use crate::motion::timeline::Timeline;
+use hexad_client::messages::{StatusMessage, Subscriber};
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
+use hexad_core::control::signals::limits::Limits;
+use hexad_core::control::signals::state::State;
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::timeline::Timeline;
+use hexad_daemon::rate_change::RateChange;
+use hexad_daemon::target_source::held_x;
+use hexad_machine::config::Config;
 
 /// Time without a status of a daemon in control, after which the approach starts again \[ns\].
 const CONTROL_TIMEOUT_NS: u64 = 200_000_000;
 
-/// Time for which the last pose is published as a target \[ns\], so that the daemon reads many of these
-/// messages.
+/// Shortest time for which the last pose is published as a target \[ns\], so that the daemon reads many of these messages, and longest,
+/// beside the settling time, for a platform that does not come into position.
 const HOLD_TIME_NS: u64 = 100_000_000;
+const LONGEST_HOLD_TIME_NS: u64 = 5_000_000_000;
 
 /// Interval of the questions whether the platform is held for a source that has ended \[ns\].
 const INQUIRY_INTERVAL_NS: u64 = 100_000_000;
@@ -293,19 +294,26 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Paused(path, t) => motion(TaskState::at_rest(path.at(*t, self.trajectory).x.into())),
-            Phase::Holding(task, since_ns) => {
-                if now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
-                    return Err(self.ended());
-                }
-                if now_ns.saturating_sub(*since_ns) > HOLD_TIME_NS {
-                    info!("the platform stands under control; hexad stop or park ends it");
-                    return Ok(PlaybackStep::Finished);
-                }
-                let kind = SetpointKind::Target;
-                let task = TaskState::at_rest(task.x.into());
-                Ok(PlaybackStep::Setpoint(Setpoint { kind, ..Setpoint::motion(now_ns, task) }))
-            }
+            Phase::Holding(task, since_ns) => self.hold(now_ns, task, now_ns.saturating_sub(*since_ns)),
         }
+    }
+
+    /// The pose of a task as a target, until the platform is in position there.
+    fn hold(&self, now_ns: u64, task: &TaskState, held_ns: u64) -> Result<PlaybackStep, MoveError> {
+        if now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
+            return Err(self.ended());
+        }
+        let is_in_position = self.status.is_some_and(|status| status.in_position == 1);
+        let longest_ns = LONGEST_HOLD_TIME_NS + self.config.deployment.in_position.settling_ns;
+        if held_ns > if is_in_position { HOLD_TIME_NS } else { longest_ns } {
+            let how =
+                if is_in_position { "stands" } else { "is not in position ([in_position]); it is held" };
+            info!("the platform {how} under control; hexad stop or park ends it");
+            return Ok(PlaybackStep::Finished);
+        }
+        let task = TaskState::at_rest(task.x.into());
+        let setpoint = Setpoint { kind: SetpointKind::Target, ..Setpoint::motion(now_ns, task) };
+        Ok(PlaybackStep::Setpoint(setpoint))
     }
 
     /// Begins where the platform is held for a source that has ended. Otherwise logs why there is no setpoint yet.

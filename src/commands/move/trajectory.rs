@@ -6,22 +6,22 @@ use std::path::Path;
 use tracing::info;
 
 use super::SetpointError;
-use crate::analysis::excitation_design::design;
-use crate::analysis::sampled_loop::edge;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::commands::orientation::OrientationFormat;
 use crate::commands::progress::time_bar;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::daemon::precheck::Precheck;
-use crate::model::task::TaskState;
-use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
-use crate::motion::excitation::Excitation;
-use crate::motion::frames::Frames;
-use crate::motion::trajectory::{Knot, interpolate};
-use crate::output::csv_table::{NumberTable, TableError, TableErrors};
-use crate::output::files::name_of;
-use crate::output::numbers::percent;
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::built_in::{BuiltInMotion, FittedMotion, fit};
+use hexad_core::motion::excitation::Excitation;
+use hexad_core::motion::frames::Frames;
+use hexad_core::motion::trajectory::{Knot, interpolate};
+use hexad_daemon::precheck::Precheck;
+use hexad_machine::analysis::excitation_design::design;
+use hexad_machine::analysis::sampled_loop::edge;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::csv_table::{NumberTable, TableError, TableErrors};
+use hexad_machine::text::files::name_of;
+use hexad_machine::text::numbers::percent;
 
 /// Largest X' and X'' at the ends of a trajectory that count as at rest, per second.
 const MAX_REST_RATE: f64 = 1e-3;
@@ -126,7 +126,10 @@ impl Trajectory {
                 }
                 ControlFlow::Continue(())
             },
-            |since_s| bar.set_position((1e3 * since_s) as u64),
+            |since_s| {
+                bar.set_position((1e3 * since_s) as u64);
+                true
+            },
         );
         bar.finish_and_clear();
         errors.into_result()
@@ -223,7 +226,7 @@ fn way_ratio(knots: &[Knot]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::csv_table::trajectory_columns;
+    use hexad_machine::text::csv_table::trajectory_columns;
 
     /// A row at rest with these t and x.
     fn row(t: &str, x: &str) -> String {
@@ -252,7 +255,7 @@ mod tests {
         let text = |unit: &str, step: f64| {
             let mut text = trajectory_columns().join(",").replacen("t,", &format!("t{unit},"), 1) + "\n";
             for k in 0..=20 {
-                let profile = crate::motion::minimum_jerk::rise(0.1 * f64::from(k), 2.0);
+                let profile = hexad_core::motion::minimum_jerk::rise(0.1 * f64::from(k), 2.0);
                 text += &format!(
                     "{},0,0,0,{},0,0,0,0,0,{},0,0,0,0,0,{},0,0\n",
                     step * f64::from(k),

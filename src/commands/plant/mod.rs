@@ -12,25 +12,24 @@ use tracing::{debug, info, warn};
 use self::other_driver::other_driver;
 use self::validation::ForceValidation;
 use crate::commands::failure::CommandError;
-use crate::config::Config;
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::inputs::DriveStatus;
-use crate::control::signals::inputs::Measurement;
-use crate::control::signals::state::State;
-use crate::control::signals::time::seconds_between;
-use crate::daemon::nanoseconds;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::lockstep::{REPEAT_INTERVAL, poll_until};
-use crate::messages::{Bus, ForceMessage, MeasuredMessage, PortError, Publisher, Subscriber};
-use crate::model::LEGS;
-use crate::model::task::task_coordinates;
-use crate::plant::hardware::Hardware;
-use crate::plant::imperfections::Imperfections;
-use crate::plant::simulator::Brakes;
-use crate::plant::terms::PlantTerms;
-use crate::realtime::clock::{Grid, sleep_until};
-use crate::realtime::setup::scheduling;
-use crate::realtime::stop_request::Stop;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::lockstep::{REPEAT_INTERVAL, poll_until};
+use hexad_client::messages::{Bus, ForceMessage, MeasuredMessage, PortError, Publisher, Subscriber};
+use hexad_client::realtime::clock::{Grid, sleep_until};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::inputs::DriveStatus;
+use hexad_core::control::signals::inputs::Measurement;
+use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_between;
+use hexad_core::model::LEGS;
+use hexad_core::model::task::task_coordinates;
+use hexad_core::plant::hardware::Hardware;
+use hexad_core::plant::imperfections::Imperfections;
+use hexad_core::plant::simulator::Brakes;
+use hexad_core::plant::terms::PlantTerms;
+use hexad_daemon::nanoseconds;
+use hexad_machine::config::Config;
 
 mod other_driver;
 mod validation;
@@ -73,7 +72,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PlantError> {
 fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
     let mut forces = bus.subscriber::<ForceMessage>(FORCE_DEPTH)?;
     let mut measured = bus.publisher()?;
-    prepare_thread(config);
+    config.deployment.realtime.prepare_peer_thread();
 
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
@@ -167,7 +166,7 @@ struct DrivenPlant {
 impl DrivenPlant {
     /// Plant at rest at home, with closed brakes.
     fn new(config: &Config, time_ns: u64) -> Self {
-        let hardware = hardware(config);
+        let hardware = config.deployment.plant.hardware(&config.machine);
         log_terms(config, hardware.simulator().terms());
         info!(name = %config.name, "plant at rest at home, brakes closed");
         let timeout_ns = nanoseconds(config.deployment.plant.force_timeout_s);
@@ -232,18 +231,6 @@ impl DrivenPlant {
     }
 }
 
-/// The hardware that a configuration describes.
-pub fn hardware(config: &Config) -> Hardware {
-    let plant = &config.deployment.plant;
-    Hardware::new(
-        &config.machine,
-        plant.brake_deceleration_m_s2,
-        plant.step_s,
-        plant.tolerance_m,
-        &plant.imperfections,
-    )
-}
-
 /// Logs the effects simulated beyond the model, and those omitted by the tolerance.
 fn log_terms(config: &Config, terms: &PlantTerms) {
     let plant = &config.deployment.plant;
@@ -276,15 +263,6 @@ fn log_brakes(before: Brakes, now: Brakes, code: DiagnosticCode) {
             warn!(leg = leg + 1, "a leg reached its end stop: brakes closed for good")
         }
         (_, Brakes::Closed | Brakes::Closing { .. }) => debug!("brakes closed"),
-    }
-}
-
-/// Prepares the thread as well as permitted: a simulator or a setpoint source below the daemon's priority, so
-/// that on a busy host it is as punctual as hardware.
-pub fn prepare_thread(config: &Config) {
-    scheduling::set_shortest_timer_slack();
-    if let Err(shortfall) = scheduling::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
-        debug!("{shortfall}");
     }
 }
 

@@ -3,10 +3,10 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::config::Config;
-use crate::daemon::process_names::named;
-use crate::messages::lockstep::REPEAT_INTERVAL;
-use crate::messages::{Bus, LeasedSubscriber, MeasuredMessage, PortError};
+use hexad_client::messages::lockstep::REPEAT_INTERVAL;
+use hexad_client::messages::{Bus, LeasedSubscriber, MeasuredMessage, PortError};
+use hexad_daemon::process_names::named;
+use hexad_machine::config::Config;
 
 /// Shortest time without a message after which no driver is assumed: longer than a busy host delays one. In
 /// lock-step a waiting plant repeats its message within it.

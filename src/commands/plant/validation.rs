@@ -6,7 +6,7 @@
 
 use tracing::warn;
 
-use crate::messages::{ForceMessage, RejectionCounts};
+use hexad_client::messages::{ForceMessage, RejectionCounts};
 
 /// Reasons for a rejection, in the order of the counts.
 const REASONS: [&str; 6] = [

@@ -1,9 +1,9 @@
-//! Cycles of a recording that missed a deadline, counted as the loop does ([`crate::realtime::cyclic`]).
+//! Cycles of a recording that missed a deadline, counted as the loop does ([`hexad_client::realtime::cyclic`]).
 
-use crate::config::Config;
-use crate::daemon::timing;
-use crate::messages::CycleMessage;
-use crate::realtime::cyclic::{ReleaseMode, Timing, is_overrun};
+use hexad_client::messages::CycleMessage;
+use hexad_client::realtime::cyclic::{ReleaseMode, Timing, is_overrun};
+use hexad_daemon::timing;
+use hexad_machine::config::Config;
 
 /// Deadlines that a cycle missed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

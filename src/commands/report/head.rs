@@ -11,11 +11,11 @@ use super::run::Run;
 use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
 use super::track::Track;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::control::signals::state::State;
-use crate::model::LEGS;
-use crate::output::numbers::MotionDigits;
+use hexad_core::control::signals::state::State;
+use hexad_core::model::LEGS;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::numbers::MotionDigits;
 
 /// Head of a page.
 #[derive(Serialize)]
@@ -151,11 +151,23 @@ pub fn json(value: &impl Serialize) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::config::coordinates::tests::framed;
-    use crate::model::inverse_geometry::leg_lengths;
-    use crate::model::task::TaskState;
+    use hexad_core::model::inverse_geometry::leg_lengths;
+    use hexad_core::model::task::TaskState;
+    use hexad_core::motion::rotation_order::RotationOrder;
+
+    /// A machine with home 1.1 m along x, and coordinates of a tool 0.35 m from it in a work frame that is turned.
+    pub fn framed() -> (Config, Coordinates) {
+        let machine = include_str!("../../../config/fried2008.toml");
+        let frames = "[[frame]]\nname = 'vertex'\nkind = 'tool'\npose = [0, 0, 0, 0.35, 0, 0]\n\
+                      [[frame]]\nname = 'optics'\nkind = 'work'\npose = [0, 0, 1.5707963267948966, 1, 0, 0]\n";
+        let config = Config::parse(&format!("{machine}\n{frames}"), "a test").unwrap();
+        let names = [Some("vertex"), Some("optics")];
+        let found = config.frames_named(names[0], names[1]).unwrap();
+        let coordinates = Coordinates::new(&config, Some(found), names, RotationOrder::Xyz);
+        (config, coordinates)
+    }
 
     #[test]
     fn a_machine_in_other_frames_has_the_same_legs() {

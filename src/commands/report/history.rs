@@ -5,14 +5,14 @@ use serde::Serialize;
 use super::deadlines::Deadlines;
 use super::signals::norms;
 use super::track::Track;
-use crate::config::Config;
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::limits::{Limit, LimitSet};
-use crate::control::signals::state::{Request, State};
-use crate::control::signals::time::seconds_between;
-use crate::daemon::report::TrackingSum;
-use crate::daemon::time_histogram::TimeHistogram;
-use crate::messages::{CycleMessage, Times};
+use hexad_client::messages::{CycleMessage, Times};
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::limits::{Limit, LimitSet};
+use hexad_core::control::signals::state::{Request, State};
+use hexad_core::control::signals::time::seconds_between;
+use hexad_daemon::report::TrackingSum;
+use hexad_daemon::time_histogram::TimeHistogram;
+use hexad_machine::config::Config;
 
 /// Bars of a distribution for each decade of time.
 const BARS_PER_DECADE: f64 = 20.0;

@@ -8,10 +8,10 @@ use clap::Args;
 use self::levels::{Extent, Level};
 use self::run::Run;
 use super::failure::{CommandError, Failure};
-use crate::config::{Config, ConfigError};
-use crate::output::files::{FileError, print, write_whole};
 use crate::output::page::{PageKind, page};
-use crate::recording::RecordingError;
+use hexad_daemon::recording::RecordingError;
+use hexad_machine::config::{Config, ConfigError};
+use hexad_machine::text::files::{FileError, print, write_whole};
 
 pub mod deadlines;
 pub mod head;

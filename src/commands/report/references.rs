@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
-use crate::control::signals::time::seconds_between;
-use crate::model::rigid::{Acceleration, Motion, Twist};
+use hexad_core::control::signals::time::seconds_between;
+use hexad_core::model::rigid::{Acceleration, Motion, Twist};
 
 /// Number of references kept: more periods than the age of any measurement.
 const KEPT: usize = 256;

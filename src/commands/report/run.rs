@@ -6,11 +6,11 @@ use super::ReportError;
 use super::history::History;
 use super::levels::{self, Level};
 use super::signals::{CycleInstants, Signals};
-use crate::config::Config;
-use crate::config::changes::changes;
-use crate::config::coordinates::Coordinates;
-use crate::recording::reader::{Recording, Summary};
-use crate::recording::{Item, RecordingError, RunInfo};
+use hexad_daemon::recording::reader::{Recording, Summary};
+use hexad_daemon::recording::{Item, RecordingError, RunInfo};
+use hexad_machine::config::Config;
+use hexad_machine::config::changes::changes;
+use hexad_machine::config::coordinates::Coordinates;
 
 /// Part of a run with one configuration.
 pub struct Part {
@@ -41,7 +41,9 @@ impl Run {
     pub fn read(recordings: &[PathBuf]) -> Result<Self, ReportError> {
         let mut files = vec![];
         for path in recordings {
-            let summary = Recording::open(path)?.summary()?;
+            let recording = Recording::open(path)?;
+            let summary = recording.summary()?;
+            recording.remark(&summary);
             files.push((path.clone(), summary));
         }
         files.sort_by_key(|(_, summary)| summary.first.release_ns);

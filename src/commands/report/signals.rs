@@ -1,18 +1,18 @@
 //! Signals of a page: numbers of one cycle, in SI units, angles in degrees.
 
 use super::references::References;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::control::signals::time::seconds_between;
-use crate::daemon::nanoseconds;
-use crate::messages::CycleMessage;
-use crate::model::LEGS;
-use crate::model::active_forces::InverseDynamics;
-use crate::model::fidelity::Exact;
-use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::Machine;
-use crate::model::rigid::{Pose, Twist};
-use crate::model::task::task_coordinates;
+use hexad_client::messages::CycleMessage;
+use hexad_core::control::signals::time::seconds_between;
+use hexad_core::model::LEGS;
+use hexad_core::model::active_forces::InverseDynamics;
+use hexad_core::model::fidelity::Exact;
+use hexad_core::model::inverse_geometry::leg_motion;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::rigid::{Pose, Twist};
+use hexad_core::model::task::task_coordinates;
+use hexad_daemon::nanoseconds;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
 
 /// Names of the signals and numbers of their components, in the order of a [`Row`]. `_ref` is the reference
 /// of the controller at the instant of the compared quantity: of the measurement; of the middle between two
@@ -211,12 +211,12 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::coordinates::tests::framed;
-    use crate::control::controller::Output;
-    use crate::control::sensing::localization::PlatformState;
-    use crate::control::signals::inputs::{Input, Measurement};
-    use crate::model::rigid::Motion;
-    use crate::model::task::TaskState;
+    use crate::commands::report::head::tests::framed;
+    use hexad_core::control::controller::Output;
+    use hexad_core::control::sensing::localization::PlatformState;
+    use hexad_core::control::signals::inputs::{Input, Measurement};
+    use hexad_core::model::rigid::Motion;
+    use hexad_core::model::task::TaskState;
 
     /// Column of the first component of a signal.
     fn column(name: &str) -> usize {
@@ -273,10 +273,7 @@ mod tests {
                     [signal.into(), format!("{signal}_ref")].map(|name: String| column(&name));
                 for k in 0..components {
                     let [actual, reference] = [row[actual + k], row[reference + k]];
-                    assert!(
-                        (actual - reference).abs() < tolerance,
-                        "{number} {signal}: {actual} {reference}"
-                    );
+                    assert!((actual - reference).abs() < tolerance, "{signal}: {actual} {reference}");
                 }
             }
         }
@@ -297,10 +294,7 @@ mod tests {
         let row = signals.row(&CycleMessage::new(&Input::default(), &output));
         for (angle, position) in [("angle", "position"), ("angle_ref", "position_ref")] {
             let [angles, positions] = [angle, position].map(|name| &row[column(name)..column(name) + 3]);
-            assert!(
-                (angles[2] + 90.0).abs() < 1e-5 && (positions[1] + 0.45).abs() < 1e-6,
-                "{angles:?} {positions:?}"
-            );
+            assert!((angles[2] + 90.0).abs() < 1e-5 && (positions[1] + 0.45).abs() < 1e-6, "{angles:?}");
         }
     }
 

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::history::History;
 use super::run::Run;
-use crate::config::Config;
-use crate::messages::Times;
 use crate::output::axis::{exponent_of, prefixed};
+use hexad_client::messages::Times;
+use hexad_machine::config::Config;
 
 /// Largest number of faults described. The time axis shows all.
 const MAX_FAULTS: usize = 20;

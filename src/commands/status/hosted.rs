@@ -1,15 +1,15 @@
 //! `hexad status` without a machine file: all machines that run on this host.
 
 use crate::commands::failure::Failure;
-use crate::operator::OperatorError;
-use crate::operator::endpoint::{Endpoint, endpoints};
-use crate::operator::protocol::{AnswerLine, RequestResult, VERSION};
-use crate::operator::requests::status_of;
-use crate::operator::status_report::StatusReport;
-use crate::operator::users::user_name;
-use crate::output::files::print;
-use crate::output::numbers::significant;
-use crate::output::text_table::{Left, Right, text_table};
+use hexad_client::operator::OperatorError;
+use hexad_client::operator::endpoint::{Endpoint, endpoints};
+use hexad_client::operator::protocol::{AnswerLine, RequestResult, VERSION};
+use hexad_client::operator::requests::status_of;
+use hexad_client::operator::status_report::StatusReport;
+use hexad_client::operator::users::user_name;
+use hexad_machine::text::files::print;
+use hexad_machine::text::numbers::significant;
+use hexad_machine::text::text_table::{Left, Right, text_table};
 
 /// Prints a line per daemon, ordered by the machine's name: a row of a table, or the answer as JSON.
 pub fn show(is_json: bool) -> Result<(), Failure> {

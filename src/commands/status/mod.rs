@@ -12,12 +12,12 @@ use super::arguments::OptionalMachineFile;
 use super::failure::Failure;
 use super::frame_options::FrameOptions;
 use super::request::machine_name;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::operator::protocol::AnswerLine;
-use crate::operator::requests;
-use crate::output::files::print;
-use crate::realtime::stop_request::Stop;
+use hexad_client::operator::protocol::AnswerLine;
+use hexad_client::operator::requests;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::files::print;
 
 mod hosted;
 pub(super) mod screen;

@@ -2,11 +2,11 @@
 
 use core::fmt;
 
-use crate::control::signals::state::State;
-use crate::operator::protocol::AnswerLine;
-use crate::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
-use crate::output::numbers::{AXES, MotionDigits, axis_unit, fixed, significant};
-use crate::output::text_table::paragraph;
+use hexad_client::operator::protocol::AnswerLine;
+use hexad_client::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
+use hexad_core::control::signals::state::State;
+use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, fixed, significant};
+use hexad_machine::text::text_table::paragraph;
 
 /// Columns of the screen.
 const WIDTH: usize = 80;
@@ -204,10 +204,10 @@ fn age_text(age_s: f64) -> String {
 #[cfg(test)]
 pub(in crate::commands) mod tests {
     use super::*;
-    use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-    use crate::control::signals::limits::Limit;
-    use crate::operator::protocol::{RequestResult, VERSION};
-    use crate::operator::status_report::{ProcessReport, TimingReport};
+    use hexad_client::operator::protocol::{DiagnosticReport, RequestResult, VERSION};
+    use hexad_client::operator::status_report::{ProcessReport, TimingReport};
+    use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+    use hexad_core::control::signals::limits::Limit;
 
     /// Answer in which every field has its greatest length.
     pub fn answer() -> AnswerLine {
@@ -228,6 +228,7 @@ pub(in crate::commands) mod tests {
             version: String::new(),
             machine: "m".repeat(20),
             process_id: 4_194_304,
+            stops: None,
             configuration: ConfigurationReport {
                 file: "/f".repeat(60),
                 sha1: "0123456789abcdef".into(),
@@ -259,8 +260,14 @@ pub(in crate::commands) mod tests {
             version: VERSION,
             result: RequestResult::Done,
             request: "status".into(),
+            id: None,
             state: "stopping".into(),
-            diagnostic: diagnostic.into(),
+            diagnostic: DiagnosticReport {
+                value: Some(5.0),
+                bound: Some(1.0),
+                text: diagnostic.to_string(),
+                ..DiagnosticReport::default()
+            },
             text: diagnostic.to_string(),
             status: Some(Box::new(report)),
         }

@@ -10,10 +10,10 @@ use crate::commands::report::levels::{Extent, Level};
 use crate::commands::report::signals::{CycleInstants, Signals};
 use crate::commands::report::summary::{Fact, live_facts};
 use crate::commands::report::track::Track;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::messages::{CycleMessage, LoopCounters, LoopTimes, StatusMessage};
 use crate::output::page::append_base64;
+use hexad_client::messages::{CycleMessage, LoopCounters, LoopTimes, StatusMessage};
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
 
 /// Least time between two samples \[s\], short enough for the eye.
 const SAMPLE_S: f64 = 0.01;

@@ -8,7 +8,7 @@ use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::realtime::stop_request::Stop;
+use hexad_client::realtime::stop_request::Stop;
 
 /// Threads that accept connections. A page has one or two open at a time.
 pub const THREADS: usize = 4;

@@ -2,20 +2,20 @@
 
 use std::collections::VecDeque;
 
-use crate::config::Config;
-use crate::control::controller::Output;
-use crate::control::sensing::localization::PlatformState;
-use crate::control::signals::errors::PoseError;
-use crate::control::signals::inputs::{Input, Measurement, Setpoint};
-use crate::control::signals::limits::LimitSet;
-use crate::control::signals::state::State;
-use crate::control::signals::time::seconds_between;
-use crate::messages::{
+use hexad_client::messages::{
     CycleMessage, ForceMessage, MeasuredMessage, PortError, SetpointMessage, StatisticsMessage,
     StatusMessage, Subscriber,
 };
-use crate::model::rigid::{Motion, Twist};
-use crate::model::task::TaskState;
+use hexad_core::control::controller::Output;
+use hexad_core::control::sensing::localization::PlatformState;
+use hexad_core::control::signals::errors::PoseError;
+use hexad_core::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad_core::control::signals::limits::LimitSet;
+use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_between;
+use hexad_core::model::rigid::{Motion, Twist};
+use hexad_core::model::task::TaskState;
+use hexad_machine::config::Config;
 
 /// Messages kept between two polls: the full capacity of the topic.
 const TOPIC_DEPTH: usize = usize::MAX;

@@ -1,6 +1,6 @@
 //! Quantities of a pose shown in a map, and the round thresholds between its colours.
 
-use crate::analysis::pose_quality::PoseQuality;
+use hexad_machine::analysis::pose_quality::PoseQuality;
 
 /// Largest number of colour bands.
 pub const MAX_BANDS: usize = 10;
@@ -103,7 +103,7 @@ pub fn plain(x: f64, digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::random::Random;
+    use hexad_core::model::random::Random;
 
     #[test]
     fn numbers_are_round_and_few() {
@@ -114,10 +114,7 @@ mod tests {
             for (low, high) in [(0.0, 1.0), (0.01, 1.0), (0.3, 0.31), (1e-12, 1e6), (-3.0, 5.0)] {
                 let scale = 10f64.powi(exponent);
                 let numbers = round_numbers(low * scale, high * scale);
-                assert!(
-                    (2..MAX_BANDS).contains(&numbers.len()),
-                    "{numbers:?} in {low} to {high} times {scale}"
-                );
+                assert!((2..MAX_BANDS).contains(&numbers.len()), "{numbers:?} of {high} times {scale}");
                 assert!(numbers.is_sorted());
             }
         }
@@ -146,10 +143,7 @@ mod tests {
             });
             for texts in [lower, higher] {
                 let all: std::collections::BTreeSet<_> = texts.iter().collect();
-                assert!(
-                    all.len() == texts.len() && !texts.concat().contains('e'),
-                    "{low} to {high}: {texts:?}"
-                );
+                assert!(all.len() == texts.len() && !texts.concat().contains('e'), "{texts:?}");
             }
         }
     }

@@ -101,10 +101,7 @@ mod tests {
         assert_eq!(areas.len(), 2);
         let [hole, disc] = [areas[0], areas[1]];
         let pi = core::f64::consts::PI;
-        assert!(
-            (disc / (64.0 * pi) - 1.0).abs() < 0.02 && (hole / (-9.0 * pi) - 1.0).abs() < 0.03,
-            "{areas:?}"
-        );
+        assert!((disc / 64.0 / pi - 1.0).abs() < 0.02 && (hole / -9.0 / pi - 1.0).abs() < 0.03, "{areas:?}");
         for outline in &found {
             let cause = Some(usize::from(area(outline) < 0.0));
             assert!(outline.iter().all(|corner| corner.cause == cause));

@@ -8,12 +8,12 @@ use plotters::style::text_anchor::HPos;
 use super::bands::{MAX_BANDS, Quantity, distinct_texts};
 use super::map_content::{LegendSample, MapLine, in_unit};
 use super::slice::Slice;
-use crate::model::machine::Machine;
 use crate::output::axis::{Axis, exponent_of, prefixed};
 use crate::output::svg::{
     Area, ChartError, DrawError, GRID, LABEL_SIZE, MARGIN, SAMPLE, TITLE_HEIGHT, UNIT, X_LABELS, Y_LABELS,
     draw_title, fitted_text, house_style, legend_rows, rgb, text, write_picture,
 };
+use hexad_core::model::machine::Machine;
 
 /// Height of one map with its title and its axis.
 const CELL_HEIGHT: i32 = 350 * UNIT;

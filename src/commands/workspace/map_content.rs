@@ -8,8 +8,8 @@ use super::bands::{Better, Quantity, plain};
 use super::contour::{Corner, outlines};
 use super::map::MapDrawing;
 use super::slice::Slice;
-use crate::analysis::pose_quality::PoseQuality;
 use crate::output::svg::{DASHED_INK, INK, rgb};
+use hexad_machine::analysis::pose_quality::PoseQuality;
 
 /// Largest coloured force, as a multiple of the least one, if every pose needs more force than the actuators
 /// have.

@@ -7,17 +7,17 @@ use serde::Serialize;
 
 use super::ObstacleText;
 use super::slice::Slice;
-use crate::analysis::clearance::Clearance;
-use crate::analysis::drive_capability::DriveCapability;
-use crate::analysis::envelope::EnvelopeBounds;
-use crate::analysis::pose_quality::PoseQuality;
-use crate::analysis::region_search::RegionBounds;
-use crate::control::constants::MAX_HOLDING_SHARE;
-use crate::model::machine::Machine;
-use crate::model::sensitivity::CONDITION_MEANING;
-use crate::model::task::TaskState;
-use crate::output::numbers::{AXES, axis_unit, significant};
-use crate::output::text_table::{Left, Right, paragraph, text_table};
+use hexad_core::control::constants::MAX_HOLDING_SHARE;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::sensitivity::CONDITION_MEANING;
+use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::clearance::Clearance;
+use hexad_machine::analysis::drive_capability::DriveCapability;
+use hexad_machine::analysis::envelope::EnvelopeBounds;
+use hexad_machine::analysis::pose_quality::PoseQuality;
+use hexad_machine::analysis::region_search::RegionBounds;
+use hexad_machine::text::numbers::{AXES, axis_unit, significant};
+use hexad_machine::text::text_table::{Left, Right, paragraph, text_table};
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 pub const SCHEMA: u32 = 1;

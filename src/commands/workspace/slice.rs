@@ -9,12 +9,12 @@ use indicatif::ProgressBar;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::analysis::pose_quality::{PoseEvaluator, PoseQuality};
-use crate::model::machine::Machine;
-use crate::model::task::TaskState;
-use crate::output::csv_table::coordinates;
-use crate::output::csv_writer::CsvWriter;
-use crate::output::files::FileError;
+use hexad_core::model::machine::Machine;
+use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::pose_quality::{PoseEvaluator, PoseQuality};
+use hexad_machine::text::csv_table::coordinates;
+use hexad_machine::text::csv_writer::CsvWriter;
+use hexad_machine::text::files::FileError;
 
 /// Poses along each axis during the search for the range.
 const COARSE_POSES: usize = 41;

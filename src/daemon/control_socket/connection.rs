@@ -6,19 +6,23 @@ use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
-use tracing::warn;
+use tracing::{info, warn};
 
+use super::answer::OpenRequest;
 use super::last_seconds::LastSeconds;
 use super::order::PendingOrder;
-use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
-use crate::operator::users::user_name;
-use crate::realtime::file_passing;
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
+use hexad_client::operator::users::user_name;
+use hexad_client::realtime::file_passing;
 
 /// Longest line \[bytes\]: many times the longest request.
 pub const MAX_LINE_BYTES: usize = 4096;
 
-/// Longest time for the first line, and for the rest of a line that has begun \[ns\].
+/// Longest time for the rest of a line that has begun \[ns\].
 pub const LINE_LIMIT_NS: u64 = 2_000_000_000;
+
+/// Longest time for the first line \[ns\]: panels connect before anybody touches them.
+const FIRST_LINE_LIMIT_NS: u64 = 120_000_000_000;
 
 /// User and process of the client, from the kernel.
 #[derive(Clone, Debug)]
@@ -38,6 +42,12 @@ impl Peer {
     /// effort.
     pub fn user(&self) -> String {
         self.user_id.map_or_else(|| "unknown".into(), user_name)
+    }
+
+    /// Logs a request.
+    pub fn log_request(&self, line: &RequestLine) {
+        let (user, process, remote) = (self.user(), self.process_id, line.remote.as_deref());
+        info!(%user, process, remote, pose = line.pose, "request: {}", line.request);
     }
 
     /// Logs a request that was not carried out, and the reason.
@@ -70,24 +80,22 @@ pub struct Connection {
     /// Whether the client may send requests, and not only read the status.
     pub may_request: bool,
     /// The request in progress.
-    pub pending: Option<PendingOrder>,
+    pub pending: Option<(OpenRequest, PendingOrder)>,
     /// The next line to be processed.
     pub line: Option<RequestLine>,
     /// Number of the reload in progress.
-    pub reload: Option<u64>,
+    pub reload: Option<(OpenRequest, u64)>,
     /// The recording of the last seconds in progress.
-    pub last_seconds: Option<LastSeconds>,
+    pub last_seconds: Option<(OpenRequest, LastSeconds)>,
     /// The last file that the client passed.
     pub file: Option<File>,
     /// Number of the connection.
     pub id: u64,
     /// Whether a motion is to be answered.
     pub waits_for_motion: bool,
-    /// Whether the client wants lines of progress before the answer.
-    pub wants_progress: bool,
     buffer: Vec<u8>,
-    /// Instant at which the incomplete line began \[ns\]; `None` after a complete line.
-    line_since_ns: Option<u64>,
+    /// Instant at which a line must be complete \[ns\]; `None` after a complete one.
+    line_until_ns: Option<u64>,
     /// Instant of the last line, at first of the connection \[ns\].
     used_ns: u64,
     has_requested: bool,
@@ -120,9 +128,8 @@ impl Connection {
             file: None,
             id,
             waits_for_motion: false,
-            wants_progress: false,
             buffer: Vec::new(),
-            line_since_ns: Some(now_ns),
+            line_until_ns: Some(now_ns + FIRST_LINE_LIMIT_NS),
             used_ns: now_ns,
             has_requested: false,
             has_ended: false,
@@ -163,26 +170,40 @@ impl Connection {
             if self.buffer.len() >= MAX_LINE_BYTES {
                 return Received::Garbage("the line is too long");
             }
-            if !self.buffer.is_empty() && self.line_since_ns.is_none() {
-                self.line_since_ns = Some(now_ns);
+            if !self.buffer.is_empty() {
+                self.line_until_ns = Some(self.line_until_ns.unwrap_or(u64::MAX).min(now_ns + LINE_LIMIT_NS));
             }
             return Received::Nothing;
         };
         let line: Vec<u8> = self.buffer.drain(..=end).collect();
-        (self.line_since_ns, self.used_ns, self.has_requested) = (None, now_ns, true);
-        if !self.buffer.is_empty() {
-            self.line_since_ns = Some(now_ns);
-        }
+        (self.used_ns, self.has_requested) = (now_ns, true);
+        self.line_until_ns = (!self.buffer.is_empty()).then_some(now_ns + LINE_LIMIT_NS);
         if line.len() > MAX_LINE_BYTES {
             return Received::Garbage("the line is too long");
         }
         String::from_utf8(line).map_or(Received::Garbage("the line is not UTF-8"), Received::Line)
     }
 
-    /// Whether the client has taken too long for a line, or has left and waits for nothing.
-    pub fn is_done(&self, now_ns: u64) -> bool {
-        let is_slow = self.line_since_ns.is_some_and(|since| now_ns.saturating_sub(since) > LINE_LIMIT_NS);
-        !self.is_waiting() && (self.has_ended || is_slow) && !self.has_line()
+    /// Whether the connection is to be closed: the client has left and no answer is due, or a line is overdue, which the client
+    /// receives as the last answer.
+    pub fn is_done(&mut self, now_ns: u64) -> bool {
+        if self.is_waiting() || self.has_line() {
+            return false;
+        }
+        let is_slow = self.line_until_ns.is_some_and(|until_ns| now_ns > until_ns);
+        if is_slow && !self.has_ended {
+            self.send(&AnswerLine::invalid(format!(
+                "closed: no line was complete in time: {} s for the first, {} s for the rest of one",
+                FIRST_LINE_LIMIT_NS / 1_000_000_000,
+                LINE_LIMIT_NS / 1_000_000_000
+            )));
+        }
+        self.has_ended || is_slow
+    }
+
+    /// Answers a request. False if the client does not read its answers or has left.
+    pub fn answer(&mut self, request: OpenRequest, answer: AnswerLine) -> bool {
+        self.send(&request.answer(answer))
     }
 
     /// Sends a line. False if the client does not read its answers or has left.
@@ -194,14 +215,27 @@ impl Connection {
     /// Rank of connections for closing; the smallest is closed first. Order: clients without a request, then
     /// the longest unused, then those that wait for an answer, last those that wait for a stop.
     pub fn rank(&self) -> (bool, bool, bool, u64) {
-        let stops = self.pending.as_ref().is_some_and(|pending| is_stop(pending.request()));
+        let stops = self.pending.as_ref().is_some_and(|(_, pending)| is_stop(pending.request()));
         (stops, self.is_waiting(), self.has_requested, self.used_ns)
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        let Self { pending, reload, last_seconds, .. } = self;
+        let requests = [
+            pending.take().map(|(request, _)| request),
+            reload.take().map(|(request, _)| request),
+            last_seconds.take().map(|(request, _)| request),
+        ];
+        requests.into_iter().flatten().for_each(OpenRequest::forget);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::{BufRead as _, BufReader};
 
     fn pair() -> (UnixStream, Connection) {
         let (client, server) = UnixStream::pair().unwrap();
@@ -238,8 +272,11 @@ mod tests {
     #[test]
     fn silence_and_half_a_line_have_a_limit_and_a_quiet_client_has_none() {
         let (mut client, mut connection) = pair();
-        assert!(!connection.is_done(LINE_LIMIT_NS));
-        assert!(connection.is_done(LINE_LIMIT_NS + 1), "silent from the beginning");
+        assert!(!connection.is_done(FIRST_LINE_LIMIT_NS));
+        assert!(connection.is_done(FIRST_LINE_LIMIT_NS + 1), "silent from the beginning");
+        let mut said = String::new();
+        BufReader::new(&client).read_line(&mut said).unwrap();
+        assert!(said.contains("closed: no line was complete in time: 120 s for the first"), "{said}");
         client.write_all(b"one\n").unwrap();
         assert_eq!(connection.receive(10), Received::Line("one\n".into()));
         assert!(!connection.is_done(100 * LINE_LIMIT_NS), "a client may send another request later");

@@ -3,10 +3,11 @@
 use std::fs::File;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
 
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::state::State;
-use crate::daemon::recorder::WindowOrder;
-use crate::operator::protocol::{AnswerLine, RequestResult, VERSION};
+use super::answer::answer_line;
+use crate::recorder::WindowOrder;
+use hexad_client::operator::protocol::{AnswerLine, RequestResult};
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::state::State;
 
 /// Name of the request.
 pub const RECORD: &str = "record";
@@ -47,15 +48,7 @@ impl LastSeconds {
                 (RequestResult::Failed, DiagnosticCode::DaemonEnding.name().into())
             }
         };
-        Some(AnswerLine {
-            version: VERSION,
-            result,
-            request: RECORD.into(),
-            state: state.name().into(),
-            diagnostic: Diagnostic::default().into(),
-            text,
-            status: None,
-        })
+        Some(answer_line(result, RECORD, state, &Diagnostic::default(), text))
     }
 }
 

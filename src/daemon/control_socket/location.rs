@@ -9,10 +9,10 @@ use std::process;
 
 use nix::unistd;
 
-use crate::config::deployment::OperatorAccess;
-use crate::messages::PortError;
-use crate::messages::location::{SYSTEM_FOLDER, open_user_folder};
-use crate::operator::endpoint::{reading_path, socket_path};
+use hexad_client::messages::PortError;
+use hexad_client::messages::location::{SYSTEM_FOLDER, open_user_folder};
+use hexad_client::operator::endpoint::{reading_path, socket_path};
+use hexad_machine::config::deployment::OperatorAccess;
 
 /// Error of opening the control socket.
 #[derive(Debug, thiserror::Error)]

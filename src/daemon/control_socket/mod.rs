@@ -12,26 +12,30 @@ use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use tracing::warn;
 
+use self::answer::OpenRequest;
 use self::connection::{Connection, Received};
 use self::location::ControlSocket;
 use self::motion::Motions;
 use self::order::Step;
 use self::status::StatusSource;
 use super::motion_requests::job::Job;
+use super::pose_gate::PoseGate;
 use super::recorder::WindowOrder;
 use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::{MAX_REQUEST_AGE_NS, Rejection};
-use crate::operator::protocol::{AnswerLine, RequestLine};
-use crate::realtime::request_word::RequestWord;
-use crate::realtime::triple_buffer::{Reader, Writer};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{MAX_REQUEST_AGE_NS, Rejection};
+use hexad_client::operator::protocol::{AnswerLine, RequestLine};
+use hexad_client::realtime::request_word::RequestWord;
+use hexad_client::realtime::triple_buffer::{Reader, Writer};
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
 
+mod answer;
 mod connection;
 mod last_seconds;
 pub mod location;
@@ -77,6 +81,8 @@ pub(super) struct ControlLinks<'a> {
     pub snapshots: Reader<Snapshot>,
     /// Request word, to the real-time thread.
     pub word: &'static RequestWord,
+    /// Other poses in which the platform may be.
+    pub gate: Arc<PoseGate>,
     /// Requests to the reload thread, and its results.
     pub request_reload: Sender<Requester>,
     pub reloaded: Receiver<Reloaded>,
@@ -91,27 +97,7 @@ pub(super) struct ControlLinks<'a> {
 
 /// Serves clients until `stop`.
 pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBool) {
-    let ControlLinks { socket, snapshots, word, request_reload, reloaded, windows, is_ending, .. } = links;
-    let mut server = Server {
-        socket,
-        snapshots,
-        word,
-        request_reload,
-        reloaded,
-        reloads: 0,
-        windows,
-        motions: Motions::new(links.jobs, links.motion_snapshots),
-        connection_ids: Vec::with_capacity(2 * MAX_CONNECTIONS),
-        accepted: 0,
-        is_ending,
-        connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
-        status: StatusSource::new(loaded),
-        woke_ns: monotonic_ns(),
-        stale_until_ns: 0,
-        warned_ns: 0,
-        unserved: 0,
-        logged: [None; 2],
-    };
+    let mut server = Server::new(loaded, links);
     while !stop.load(Ordering::Relaxed) {
         server.rest();
         server.wait();
@@ -130,6 +116,7 @@ struct Server<'a> {
     socket: ControlSocket,
     snapshots: Reader<Snapshot>,
     word: &'static RequestWord,
+    gate: Arc<PoseGate>,
     request_reload: Sender<Requester>,
     reloaded: Receiver<Reloaded>,
     /// Number of reload requests so far.
@@ -142,15 +129,48 @@ struct Server<'a> {
     is_ending: &'a AtomicBool,
     connections: Vec<Connection>,
     status: StatusSource,
+    /// The present \[ns\].
+    clock: fn() -> u64,
     /// End of the last wait \[ns\].
     woke_ns: u64,
     /// Until this instant, a request may be from before the process was held \[ns\].
     stale_until_ns: u64,
+    /// Unix time of the beginning \[us\].
+    began_us: u64,
     /// Instant of the last warning \[ns\], and the number of clients since then.
     warned_ns: u64,
     unserved: u64,
     /// The last logged rejections of setpoints and measurements.
     logged: [Option<Rejection>; 2],
+}
+
+impl<'a> Server<'a> {
+    fn new(loaded: Arc<Loaded>, links: ControlLinks<'a>) -> Self {
+        let ControlLinks { socket, snapshots, word, gate, request_reload, reloaded, windows, .. } = links;
+        Self {
+            socket,
+            snapshots,
+            word,
+            gate,
+            request_reload,
+            reloaded,
+            reloads: 0,
+            windows,
+            motions: Motions::new(links.jobs, links.motion_snapshots),
+            connection_ids: Vec::with_capacity(2 * MAX_CONNECTIONS),
+            accepted: 0,
+            is_ending: links.is_ending,
+            connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
+            status: StatusSource::new(loaded),
+            clock: monotonic_ns,
+            woke_ns: monotonic_ns(),
+            stale_until_ns: 0,
+            began_us: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_micros() as u64),
+            warned_ns: 0,
+            unserved: 0,
+            logged: [None; 2],
+        }
+    }
 }
 
 impl Server<'_> {
@@ -160,11 +180,15 @@ impl Server<'_> {
         sleep(Duration::from_nanos(worked_ns.min(MAX_REST_NS)));
     }
 
-    /// Waits for input, or for a short time. Closes connections whose client has left.
+    /// Waits for input, or for a short time.
     fn wait(&mut self) {
         let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
         let is_pending = self.motions.is_running() || self.connections.iter().any(is_busy);
-        let timeout = PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS });
+        self.poll(PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS }));
+    }
+
+    /// Waits for input, and closes connections whose client has left.
+    fn poll(&mut self, timeout: PollTimeout) {
         let listeners = core::iter::once(&self.socket.listener).chain(&self.socket.reading);
         let mut events: Vec<_> = listeners.map(|it| PollFd::new(it.as_fd(), PollFlags::POLLIN)).collect();
         let listeners = events.len();
@@ -185,12 +209,12 @@ impl Server<'_> {
         self.connections.retain(|connection| {
             let is_gone =
                 gone.next().unwrap_or_default() && !connection.has_line() && connection.line.is_none();
-            if let Some(pending) = connection.pending.as_ref().filter(|_| is_gone) {
+            if let Some((_, pending)) = connection.pending.as_ref().filter(|_| is_gone) {
                 pending.cancel(word);
             }
             !is_gone
         });
-        let now_ns = monotonic_ns();
+        let now_ns = (self.clock)();
         if now_ns.saturating_sub(self.woke_ns) > MAX_REQUEST_AGE_NS {
             self.stale_until_ns = now_ns + STALE_TIME_NS;
         }
@@ -240,7 +264,7 @@ impl Server<'_> {
         let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
         let Some((_, least)) = ranks.min() else { return false };
         let closed = self.connections.swap_remove(least);
-        closed.pending.iter().for_each(|pending| pending.cancel(self.word));
+        closed.pending.iter().for_each(|(_, pending)| pending.cancel(self.word));
         true
     }
 
@@ -273,14 +297,14 @@ impl Server<'_> {
             Received::Nothing => !connection.is_done(self.woke_ns),
             Received::Line(line) => match RequestLine::parse(&line) {
                 Ok(line) if !connection.may_request && line.request != "status" => {
-                    connection.send(&AnswerLine::invalid(READING_ONLY.into()))
+                    connection.answer(OpenRequest::of(&line), AnswerLine::invalid(READING_ONLY.into()))
                 }
                 Ok(line) if line.is_stop() => self.respond(connection, &line, snapshot, &mut None),
                 Ok(line) => {
                     connection.line = Some(line);
                     true
                 }
-                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
+                Err((id, reason)) => connection.send(&AnswerLine { id, ..AnswerLine::invalid(reason) }),
             },
             Received::Garbage(reason) => {
                 connection.send(&AnswerLine::invalid(reason.into()));
@@ -324,25 +348,42 @@ impl Server<'_> {
 
     /// Checks every pending request and answers those that have ended.
     fn advance(&mut self) {
-        let (snapshot, now_ns, word) = (*self.snapshots.read(), monotonic_ns(), self.word);
+        let (snapshot, now_ns, word) = (*self.snapshots.read(), (self.clock)(), self.word);
+        let gate = self.gate.clone();
         let state = snapshot.status.state().unwrap_or_default();
         self.connections.retain_mut(|connection| {
-            if let Some(answer) = connection.last_seconds.as_ref().and_then(|it| it.answer(state)) {
-                connection.last_seconds = None;
-                if !connection.send(&answer) {
-                    return false;
-                }
+            let written = connection.last_seconds.as_ref().and_then(|(_, recording)| recording.answer(state));
+            if let Some(answer) = written
+                && let Some((request, _)) = connection.last_seconds.take()
+                && !connection.answer(request, answer)
+            {
+                return false;
             }
-            let Some(pending) = &mut connection.pending else { return true };
+            let Some((request, mut pending)) = connection.pending.take() else { return true };
             match pending.step(&snapshot, word, now_ns) {
-                Step::Wait => true,
-                Step::Progress(line) => !connection.wants_progress || connection.send(&line),
-                Step::Answer(line) => {
-                    connection.pending = None;
+                Step::Answer(mut line) => {
+                    name_poses(&gate, &mut line);
                     connection.peer.log_failure(&line);
-                    connection.send(&line)
+                    return connection.answer(request, line);
                 }
+                Step::Progress(line) => {
+                    let progress = request.progress(line);
+                    connection.pending = Some((request, pending));
+                    return progress.is_none_or(|line| connection.send(&line));
+                }
+                Step::Wait => connection.pending = Some((request, pending)),
             }
+            true
         });
     }
 }
+
+/// Adds the poses to a refusal because of them.
+fn name_poses(gate: &PoseGate, answer: &mut AnswerLine) {
+    if answer.diagnostic.code == DiagnosticCode::OtherPoses as u32 {
+        answer.text += &format!(" ({})", gate.poses());
+    }
+}
+
+#[cfg(test)]
+mod tests;

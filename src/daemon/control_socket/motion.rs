@@ -5,49 +5,48 @@
 
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
-use tracing::{debug, info};
+use tracing::debug;
 
+use super::answer::OpenRequest;
 use super::connection::Connection;
-use super::order::{Order, PendingOrder, Step};
-use super::{MAX_WITHIN_S, Server};
-use crate::control::signals::state::Request;
-use crate::daemon::motion_requests::job::{End, Job, Jog, MotionEvent, MotionInput};
-use crate::daemon::motion_requests::order::{Motion, MotionOrder};
-use crate::daemon::snapshot::Snapshot;
-use crate::messages::clock::monotonic_ns;
-use crate::operator::motion_fields::GOTO;
-use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
-use crate::realtime::triple_buffer::Writer;
-
-const REPLACED: &str = "a later request has replaced it";
+use super::order::{Order, PendingOrder, REPLACED, Step, stop_count};
+use super::{MAX_WITHIN_S, Server, name_poses};
+use crate::control_socket::answer::answer_line;
+use crate::motion_requests::job::{End, Job, Jog, MotionEvent, MotionInput};
+use crate::motion_requests::order::{Motion, MotionOrder};
+use crate::snapshot::Snapshot;
+use hexad_client::operator::motion_fields::GOTO;
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use hexad_client::realtime::request_word::RequestWord;
+use hexad_client::realtime::triple_buffer::Writer;
+use hexad_core::control::signals::state::Request;
 
 /// Links to the motion thread, and the motion that it carries out.
 pub struct Motions {
     jobs: Sender<Job>,
     snapshots: Writer<Snapshot>,
-    running: Option<Running>,
+    pub(super) running: Option<Running>,
     /// The motion that takes over when the running one has ended.
-    next: Option<(Job, Running)>,
-    /// Whether a request has ended control since the last round.
-    is_stopped: bool,
+    pub(super) next: Option<(Job, Running)>,
 }
 
 /// Motion in progress.
-struct Running {
+pub(super) struct Running {
     request: String,
+    unanswered: Option<OpenRequest>,
+    /// [`stop_count`] when it was asked for: after a stop it takes no control.
+    stops_before: u32,
+    /// Whether it is planned.
+    has_begun: bool,
     /// Number of its connection, and the process of the client.
     connection: u64,
     process_id: i32,
     ends_with_connection: bool,
-    /// Whether its answer comes when it is completed, and whether lines of progress come before.
+    /// Whether its answer comes when it is completed.
     waits: bool,
-    wants_progress: bool,
-    is_answered: bool,
     /// Longest wait for control \[ns\].
     within_ns: u64,
     engagement: Option<PendingOrder>,
-    /// Whether a request has ended control since it began; it then takes none.
-    is_stopped: bool,
     is_jog: bool,
     /// The bound that stops a jog; empty without one.
     blocked: String,
@@ -58,7 +57,7 @@ struct Running {
 impl Motions {
     /// No motion.
     pub fn new(jobs: Sender<Job>, snapshots: Writer<Snapshot>) -> Self {
-        Self { jobs, snapshots, running: None, next: None, is_stopped: false }
+        Self { jobs, snapshots, running: None, next: None }
     }
 
     /// Whether a motion is in progress.
@@ -71,10 +70,12 @@ impl Motions {
         let running = self.running.as_ref().filter(|running| connections.contains(&running.connection))?;
         u32::try_from(running.process_id).ok().filter(|process_id| *process_id > 0)
     }
+}
 
-    /// Ends the wait for control of all motions, because a request has ended control.
-    pub fn stop(&mut self) {
-        self.is_stopped = true;
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Its client has left.
+        self.unanswered.take().into_iter().for_each(OpenRequest::forget);
     }
 }
 
@@ -82,6 +83,11 @@ impl Running {
     /// Whether the connection to which it belongs has ended.
     fn has_left(&self, connections: &[u64]) -> bool {
         self.ends_with_connection && !connections.contains(&self.connection)
+    }
+
+    /// Whether it is to begin, and a stop came after it was asked for.
+    fn is_stopped(&self, word: &RequestWord) -> bool {
+        !self.has_begun && self.stops_before != stop_count(word, Request::Engage)
     }
 
     fn end(&self, end: End) {
@@ -95,52 +101,53 @@ impl Server<'_> {
     pub(super) fn begin_motion(
         &mut self,
         connection: &mut Connection,
+        request: OpenRequest,
         line: &RequestLine,
         snapshot: &Snapshot,
     ) -> bool {
+        let stops_before = stop_count(self.word, Request::Engage);
         let order = match MotionOrder::of_line(line, &self.status.loaded().config) {
             Ok(order) => order,
-            Err(reason) => return connection.send(&AnswerLine::invalid(reason)),
+            Err(reason) => return connection.answer(request, AnswerLine::invalid(reason)),
         };
-        if let Some(answer) = self.refusal(&line.request, snapshot) {
-            return connection.send(&answer);
+        if let Some(answer) = self.refusal(line, snapshot) {
+            return connection.answer(request, answer);
         }
         let named = |result, text: String| answer(result, &line.request, snapshot, text);
         let (peer, time_ns) = (connection.peer.clone(), self.woke_ns);
+        if let Some(text) = self.motion_of_other(connection.id) {
+            return connection.answer(request, named(RequestResult::Refused, text));
+        }
         if let Some(running) = &self.motions.running {
             let is_own = running.connection == connection.id;
-            if !is_own && self.connection_ids.contains(&running.connection) {
-                let text = format!(
-                    "a {} of process {} is in progress; end it first (hexad stop, or Ctrl-C there)",
-                    running.request, running.process_id
-                );
-                return connection.send(&named(RequestResult::Refused, text));
-            }
             if let (Motion::Jog(rates), true, None) =
                 (&order.motion, is_own && running.is_jog, &self.motions.next)
             {
                 let jog = Jog { rates: *rates, coordinates: order.coordinates.clone(), time_ns };
                 if running.inputs.send(MotionInput::Jog(Box::new(jog))).is_ok() {
                     debug!(user = %peer.user(), process = peer.process_id, "jog");
-                    return connection.send(&named(RequestResult::Accepted, running.blocked.clone()));
+                    return connection
+                        .answer(request, named(RequestResult::Accepted, running.blocked.clone()));
                 }
             }
             running.end(End::TakeOver);
         }
         let is_read = self.supersede_motion(connection, snapshot);
-        let replaced = connection.pending.take().map(|replaced| replaced.superseded(snapshot));
+        let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.word));
+        let is_read =
+            is_read & replaced.is_none_or(|(it, order)| connection.answer(it, order.superseded(snapshot)));
         let ((inputs, received), (sent, events)) = (channel(), channel());
         let running = Running {
             request: line.request.clone(),
+            unanswered: Some(request),
+            stops_before,
+            has_begun: false,
             connection: connection.id,
             process_id: peer.process_id,
             ends_with_connection: line.wait || line.request != GOTO,
             waits: line.wait && !matches!(order.motion, Motion::Jog(_)),
-            wants_progress: line.progress,
-            is_answered: false,
             within_ns: (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64,
             engagement: None,
-            is_stopped: false,
             is_jog: matches!(order.motion, Motion::Jog(_)),
             blocked: String::new(),
             inputs,
@@ -149,9 +156,19 @@ impl Server<'_> {
         connection.waits_for_motion = true;
         let job = Job::new(self.status.loaded().clone(), order, time_ns, received, sent);
         self.motions.next = Some((job, running));
-        let remote = line.remote.as_deref();
-        info!(user = %peer.user(), process = peer.process_id, remote, "request: {}", line.request);
-        is_read && replaced.is_none_or(|replaced| connection.send(&replaced))
+        peer.log_request(line);
+        is_read
+    }
+
+    /// Why a connection may begin no motion: another one has begun one.
+    fn motion_of_other(&self, id: u64) -> Option<String> {
+        let Motions { running, next, .. } = &self.motions;
+        let mut motions = running.iter().chain(next.iter().map(|(_, next)| next));
+        let other = motions.find(|it| it.connection != id && self.connection_ids.contains(&it.connection))?;
+        Some(format!(
+            "a {} of process {} is in progress; end it first (hexad stop, or Ctrl-C there)",
+            other.request, other.process_id
+        ))
     }
 
     /// Passes on the newest snapshot, and answers what the motion thread has reported.
@@ -161,9 +178,9 @@ impl Server<'_> {
         self.connection_ids.clear();
         self.connection_ids.extend(self.connections.iter().map(|connection| connection.id));
         self.motions.next.take_if(|(_, next)| next.has_left(&self.connection_ids));
-        let is_stopped = core::mem::take(&mut self.motions.is_stopped);
-        if let Some((_, mut next)) = self.motions.next.take_if(|_| is_stopped) {
-            self.answer_motion(&mut next, RequestResult::Superseded, REPLACED.into(), &snapshot);
+        let word = self.word;
+        if let Some((_, mut next)) = self.motions.next.take_if(|(_, next)| next.is_stopped(word)) {
+            self.answer_motion(&mut next, RequestResult::Superseded, STOPPED.into(), &snapshot);
         }
         let Some(mut running) = self.motions.running.take() else {
             return self.begin_next();
@@ -171,7 +188,10 @@ impl Server<'_> {
         if running.has_left(&self.connection_ids) {
             running.end(End::Rest);
         }
-        running.is_stopped |= is_stopped;
+        if running.is_stopped(word) {
+            running.end(End::AtOnce);
+            self.answer_motion(&mut running, RequestResult::Superseded, STOPPED.into(), &snapshot);
+        }
         let has_ended = self.receive_events(&mut running, &snapshot);
         if !has_ended {
             self.motions.running = Some(running);
@@ -196,17 +216,19 @@ impl Server<'_> {
     fn receive_events(&mut self, running: &mut Running, snapshot: &Snapshot) -> bool {
         loop {
             match running.events.try_recv() {
-                Ok(MotionEvent::Accepted(text)) if !running.waits => {
-                    self.answer_motion(running, RequestResult::Accepted, text, snapshot);
-                }
                 Ok(MotionEvent::Accepted(text)) => {
-                    self.report_progress(running, RequestResult::Accepted, text, snapshot);
+                    running.has_begun = true;
+                    if running.waits {
+                        self.report_progress(running, RequestResult::Accepted, text, snapshot);
+                    } else {
+                        self.answer_motion(running, RequestResult::Accepted, text, snapshot);
+                    }
                 }
                 Ok(MotionEvent::WantsControl) => {
                     let deadline_ns = self.woke_ns + running.within_ns;
-                    let order =
-                        Order { request: Request::Engage, waits: true, is_patient: true, deadline_ns };
-                    let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
+                    let (request, stops_before) = (Request::Engage, running.stops_before);
+                    let order = Order { request, stops_before, waits: true, is_patient: true, deadline_ns };
+                    let pending = PendingOrder::post(order, snapshot, self.word, (self.clock)());
                     running.engagement = Some(pending);
                 }
                 Ok(MotionEvent::Blocked(bound)) => running.blocked = bound.unwrap_or_default(),
@@ -231,16 +253,18 @@ impl Server<'_> {
     /// Checks the wait for control of a motion.
     fn advance_engagement(&mut self, running: &mut Running, snapshot: &Snapshot) {
         let Some(engagement) = &mut running.engagement else { return };
-        let step = engagement.step(snapshot, self.word, monotonic_ns());
+        let step = engagement.step(snapshot, self.word, (self.clock)());
         let (result, text) = match step {
-            _ if running.is_stopped => (RequestResult::Superseded, REPLACED.into()),
             Step::Wait => return,
             Step::Progress(line) => return self.report_progress(running, line.result, line.text, snapshot),
             Step::Answer(line) if line.result == RequestResult::Done => {
                 running.engagement = None;
                 return;
             }
-            Step::Answer(line) => (line.result, format!("engage: {}", line.text)),
+            Step::Answer(mut line) => {
+                name_poses(&self.gate, &mut line);
+                (line.result, format!("engage: {}", line.text))
+            }
         };
         engagement.cancel(self.word);
         running.engagement = None;
@@ -256,9 +280,11 @@ impl Server<'_> {
         snapshot: &Snapshot,
     ) {
         let connection = self.connections.iter_mut().find(|it| it.id == running.connection);
-        if let Some(connection) = connection.filter(|_| running.wants_progress && !running.is_answered) {
+        let line = answer(result, &running.request, snapshot, text);
+        let progress = running.unanswered.as_ref().and_then(|request| request.progress(line));
+        if let Some((connection, line)) = connection.zip(progress) {
             // A client that has left is noticed in the next round.
-            connection.send(&answer(result, &running.request, snapshot, text));
+            connection.send(&line);
         }
     }
 
@@ -270,34 +296,47 @@ impl Server<'_> {
         text: String,
         snapshot: &Snapshot,
     ) {
-        if core::mem::replace(&mut running.is_answered, true) {
-            return;
-        }
-        let connection = self.connections.iter_mut().find(|it| it.id == running.connection);
-        if let Some(connection) = connection {
-            let answer = answer(result, &running.request, snapshot, text);
-            connection.waits_for_motion = false;
-            connection.peer.log_failure(&answer);
-            connection.send(&answer);
+        let Some(request) = running.unanswered.take() else { return };
+        match self.connections.iter_mut().find(|it| it.id == running.connection) {
+            Some(connection) => {
+                let answer = answer(result, &running.request, snapshot, text);
+                connection.waits_for_motion = false;
+                connection.peer.log_failure(&answer);
+                connection.answer(request, answer);
+            }
+            None => request.forget(),
         }
     }
 
-    /// Answers the motions of a connection that wait, because its later request replaces them. False if it does not read.
+    /// Answers the motions of a connection that wait, because its later request replaces them; those that are not under control yet
+    /// end. False if it does not read.
     pub(super) fn supersede_motion(&mut self, connection: &mut Connection, snapshot: &Snapshot) -> bool {
         connection.waits_for_motion = false;
-        let Motions { running, next, .. } = &mut self.motions;
-        let motions = running.iter_mut().chain(next.iter_mut().map(|(_, next)| next));
         let id = connection.id;
-        let mut unanswered = motions.filter(|it| it.connection == id && !it.is_answered);
-        unanswered.all(|it| {
-            it.is_answered = true;
-            connection.send(&answer(RequestResult::Superseded, &it.request, snapshot, REPLACED.into()))
-        })
+        let mut is_read = true;
+        let mut supersede = |it: &mut Running| {
+            if let Some(request) = it.unanswered.take() {
+                let superseded = answer(RequestResult::Superseded, &it.request, snapshot, REPLACED.into());
+                is_read &= connection.answer(request, superseded);
+            }
+        };
+        if let Some((_, mut next)) = self.motions.next.take_if(|(_, next)| next.connection == id) {
+            supersede(&mut next);
+        }
+        if let Some(running) = self.motions.running.as_mut().filter(|running| running.connection == id) {
+            supersede(running);
+            let engagement = running.engagement.take();
+            if engagement.is_some() || !running.has_begun {
+                running.end(End::AtOnce);
+            }
+            engagement.into_iter().for_each(|engagement| engagement.cancel(self.word));
+        }
+        is_read
     }
 }
 
 fn answer(result: RequestResult, request: &str, snapshot: &Snapshot, text: String) -> AnswerLine {
     let state = snapshot.status.state().unwrap_or_default();
     let diagnostic = snapshot.status.diagnostic.diagnostic().unwrap_or_default();
-    AnswerLine::named(result, request, state, diagnostic, text)
+    answer_line(result, request, state, &diagnostic, text)
 }

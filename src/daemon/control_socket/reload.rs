@@ -1,11 +1,13 @@
 //! The request `reload`, which the reload thread carries out.
 
 use super::Server;
+use super::answer::OpenRequest;
 use super::connection::Connection;
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::daemon::reload::{ReloadError, Reloaded};
-use crate::daemon::snapshot::Snapshot;
-use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
+use crate::control_socket::answer::answer_line;
+use crate::reload::{ReloadError, Reloaded};
+use crate::snapshot::Snapshot;
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult};
+use hexad_core::control::signals::diagnostic::Diagnostic;
 
 /// Name of the request. The controller does not process it.
 pub const RELOAD: &str = "reload";
@@ -16,15 +18,22 @@ impl Server<'_> {
     pub(super) fn begin_reload(
         &mut self,
         connection: &mut Connection,
+        request: OpenRequest,
         line: &RequestLine,
         snapshot: &Snapshot,
     ) -> bool {
+        if connection.reload.is_some() {
+            let text = "a reload of this connection is in progress".into();
+            return connection.answer(request, answer_to_reload(RequestResult::Refused, snapshot, text));
+        }
+        connection.peer.log_request(line);
         self.reloads += 1;
-        connection.reload = Some(self.reloads);
         // Does not fail, because the reload thread ends after this one.
-        let _ = self.request_reload.send(connection.reload);
+        let _ = self.request_reload.send(Some(self.reloads));
         let text = "the machine file is examined".into();
-        !line.progress || connection.send(&answer_to_reload(RequestResult::Accepted, snapshot, text))
+        let progress = request.progress(answer_to_reload(RequestResult::Accepted, snapshot, text));
+        connection.reload = Some((request, self.reloads));
+        progress.is_none_or(|line| connection.send(&line))
     }
 
     /// Answers the completed reloads.
@@ -40,11 +49,8 @@ impl Server<'_> {
             };
             let answer = answer_to_reload(result, self.snapshots.read(), text);
             self.connections.retain_mut(|connection| {
-                let is_answered = requester.is_some() && connection.reload == requester;
-                !is_answered || {
-                    connection.reload = None;
-                    connection.send(&answer)
-                }
+                let answered = connection.reload.take_if(|(_, number)| requester == Some(*number));
+                answered.is_none_or(|(request, _)| connection.answer(request, answer.clone()))
             });
         }
     }
@@ -52,5 +58,5 @@ impl Server<'_> {
 
 fn answer_to_reload(result: RequestResult, snapshot: &Snapshot, text: String) -> AnswerLine {
     let state = snapshot.status.state().unwrap_or_default();
-    AnswerLine::named(result, RELOAD, state, Diagnostic::from(DiagnosticCode::None), text)
+    answer_line(result, RELOAD, state, &Diagnostic::default(), text)
 }

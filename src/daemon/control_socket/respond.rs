@@ -2,20 +2,22 @@
 
 use core::sync::atomic::Ordering;
 
-use tracing::{debug, info};
+use tracing::debug;
 
+use super::answer::OpenRequest;
 use super::connection::Connection;
 use super::last_seconds::{LastSeconds, RECORD};
-use super::order::{Order, PendingOrder};
+use super::order::{Order, PendingOrder, stop_count};
 use super::reload::RELOAD;
 use super::{MAX_WITHIN_S, Server};
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::state::Request;
-use crate::daemon::motion_requests::order::MotionOrder;
-use crate::daemon::snapshot::Snapshot;
-use crate::messages::clock::monotonic_ns;
-use crate::operator::motion_fields::{GOTO, HOLD, JOG};
-use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
+use crate::control_socket::answer::answer_line;
+use crate::motion_requests::order::MotionOrder;
+use crate::snapshot::Snapshot;
+use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG};
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use hexad_client::operator::status_report::StopNumber;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::Request;
 
 impl Server<'_> {
     /// Responds to a line. False if the connection must be closed. `status` caches the answer to `status` for
@@ -27,84 +29,112 @@ impl Server<'_> {
         snapshot: &Snapshot,
         status: &mut Option<AnswerLine>,
     ) -> bool {
+        let request = OpenRequest::of(line);
         if line.request == "status" {
             self.status.mover = self.motions.client(&self.connection_ids);
+            self.status.stops = Some(self.stops());
             let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
-            return connection.send(answer);
+            return connection.answer(request, answer.clone());
         }
-        if line.request == RELOAD {
-            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RELOAD}");
-            return self.begin_reload(connection, line, snapshot);
-        }
-        if line.request == RECORD {
-            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RECORD}");
-            return match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
-                Ok(ordered) => connection.last_seconds.replace(ordered).is_none(),
-                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
+        let Some(of_controller) = line.controller_request() else {
+            return match line.request.as_str() {
+                RELOAD => self.begin_reload(connection, request, line, snapshot),
+                RECORD => self.begin_recording(connection, request, line),
+                name if MotionOrder::is_named(name) => self.begin_motion(connection, request, line, snapshot),
+                other => {
+                    let names = Request::ALL.map(Request::name).join(", ");
+                    let text = format!(
+                        "unknown request {other:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {names}"
+                    );
+                    connection.answer(request, AnswerLine::invalid(text))
+                }
             };
-        }
-        if MotionOrder::is_named(&line.request) {
-            return self.begin_motion(connection, line, snapshot);
-        }
-        let Some(request) = line.controller_request() else {
-            let names = Request::ALL.map(Request::name).join(", ");
-            let text = format!(
-                "unknown request {:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {names}",
-                line.request
-            );
-            return connection.send(&AnswerLine::invalid(text));
         };
-        // Before the log, which may block.
-        let answer = self.begin(connection, request, line, snapshot);
-        let is_read = self.supersede_motion(connection, snapshot);
-        let (user, process) = (connection.peer.user(), connection.peer.process_id);
-        info!(%user, process, remote = line.remote.as_deref(), "request: {}", request.name());
+        let is_read = self.begin(connection, request, of_controller, line, snapshot);
+        connection.peer.log_request(line);
         is_read
-            && answer.is_none_or(|answer| {
-                connection.peer.log_failure(&answer);
-                connection.send(&answer)
-            })
     }
 
-    /// Posts a request, or returns the answer that refuses it.
+    /// Posts a request to the controller, or refuses it. First the requests of the connection that it replaces are answered.
     fn begin(
         &mut self,
         connection: &mut Connection,
-        request: Request,
+        request: OpenRequest,
+        of_controller: Request,
         line: &RequestLine,
         snapshot: &Snapshot,
-    ) -> Option<AnswerLine> {
-        let replaced = connection.pending.take();
-        if is_stop(request) || request == Request::Park {
-            self.motions.stop();
-        }
-        if request.can_begin_control()
-            && let Some(answer) = self.refusal(request.name(), snapshot)
-        {
-            return Some(answer);
-        }
+    ) -> bool {
+        let stops_before = stop_count(self.word, of_controller);
+        let refusal = if of_controller.can_begin_control() { self.refusal(line, snapshot) } else { None };
+        let refusal = refusal.or_else(|| self.refused_pose(line, snapshot));
         let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
         let order = Order {
-            request,
+            request: of_controller,
+            stops_before,
             waits: line.wait,
-            is_patient: line.until_ready,
+            // Until a cycle has read the selected pose.
+            is_patient: line.until_ready || line.pose.is_some_and(|number| number > 1),
             deadline_ns: self.woke_ns + within_ns,
         };
-        connection.wants_progress = line.progress;
-        let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
-        connection.pending = Some(pending);
-        replaced.map(|replaced| replaced.superseded(snapshot))
+        // What is answered takes no control any more.
+        let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.word));
+        let post = || PendingOrder::post(order, snapshot, self.word, (self.clock)());
+        let pending = refusal.is_none().then(post);
+        let is_read = replaced.is_none_or(|(it, order)| connection.answer(it, order.superseded(snapshot)));
+        let is_read = self.supersede_motion(connection, snapshot) && is_read;
+        if let Some(answer) = refusal {
+            connection.peer.log_failure(&answer);
+            return connection.answer(request, answer) && is_read;
+        }
+        connection.pending = pending.map(|pending| (request, pending));
+        is_read
     }
-    /// Answer to a request that would begin control or motion, if the daemon ends, or if the request may be old.
-    pub(super) fn refusal(&self, request: &str, snapshot: &Snapshot) -> Option<AnswerLine> {
+
+    /// Selects the pose of a request, or returns the refusal. A bridge may not select one: only an operator at the platform sees it.
+    fn refused_pose(&self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
+        let number = line.pose?;
+        let is_here = line.remote.is_none() && line.request == Request::Engage.name();
+        let chosen = match is_here {
+            true => self.gate.choose(number as usize, snapshot.measurement.as_ref()),
+            false => Err("only engage selects a pose, and only from this host".into()),
+        };
+        let (state, code) = (snapshot.status.state().unwrap_or_default(), DiagnosticCode::OtherPoses);
+        let refused = |text| answer_line(RequestResult::Refused, &line.request, state, &code.into(), text);
+        chosen.err().map(refused)
+    }
+
+    /// Passes a recording to the recorder. False if the client has left.
+    fn begin_recording(&self, connection: &mut Connection, request: OpenRequest, line: &RequestLine) -> bool {
+        connection.peer.log_request(line);
+        if connection.last_seconds.is_some() {
+            let text = "a recording of this connection is in progress".into();
+            return connection.answer(request, AnswerLine::invalid(text));
+        }
+        match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
+            Ok(ordered) => connection.last_seconds.replace((request, ordered)).is_none(),
+            Err(reason) => connection.answer(request, AnswerLine::invalid(reason)),
+        }
+    }
+
+    /// The number of stops so far.
+    pub(super) fn stops(&self) -> StopNumber {
+        StopNumber { daemon: self.began_us, count: stop_count(self.word, Request::Engage) }
+    }
+
+    /// Answer to a request that would begin control or motion, if the daemon ends, if the request may be old, or if a stop came after
+    /// it was asked for.
+    pub(super) fn refusal(&self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
         let state = snapshot.status.state().unwrap_or_default();
         let answer = |result, code: DiagnosticCode, text: &str| {
-            Some(AnswerLine::named(result, request, state, Diagnostic::from(code), text.into()))
+            Some(answer_line(result, &line.request, state, &code.into(), text.into()))
         };
         if self.is_ending.load(Ordering::Relaxed) {
             let code = DiagnosticCode::DaemonEnding;
             return answer(RequestResult::Refused, code, code.name());
+        }
+        if line.stops.is_some_and(|stops_before| stops_before != self.stops()) {
+            return answer(RequestResult::Superseded, DiagnosticCode::None, STOPPED);
         }
         let text = "the daemon was held and the request may be old; send it again";
         let is_stale = self.woke_ns < self.stale_until_ns;

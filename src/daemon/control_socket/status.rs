@@ -5,38 +5,23 @@ use std::os::unix::fs::MetadataExt;
 use std::process;
 use std::sync::Arc;
 
-use crate::config::Config;
-use crate::control::signals::diagnostic::Diagnostic;
-use crate::control::signals::inputs::{Publishers, SetpointKind};
-use crate::control::signals::limits::{Limit, LimitSet};
-use crate::control::signals::state::State;
-use crate::daemon::process_names::{command, sentence};
-use crate::daemon::reload::Loaded;
-use crate::daemon::snapshot::Snapshot;
-use crate::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
-use crate::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
-use crate::model::LEGS;
-use crate::operator::protocol::{AnswerLine, DiagnosticReport, RequestResult, VERSION};
-use crate::operator::status_report::{
-    ConfigurationReport, LegReport, ProcessReport, SourceReport, StatusReport, TimingReport,
+use crate::control_socket::answer::diagnostic_report;
+use crate::process_names::{command, sentence};
+use crate::reload::Loaded;
+use crate::snapshot::Snapshot;
+use crate::version::VERSION as BUILD;
+use hexad_client::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
+use hexad_client::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
+use hexad_client::operator::protocol::{AnswerLine, RequestResult, VERSION};
+use hexad_client::operator::status_report::{
+    ConfigurationReport, LegReport, ProcessReport, SourceReport, StatusReport, StopNumber, TimingReport,
 };
-use crate::operator::users::user_name;
-use crate::output::version::VERSION as BUILD;
-
-impl From<Diagnostic> for DiagnosticReport {
-    fn from(diagnostic: Diagnostic) -> Self {
-        let finite = |number: f64| Some(number).filter(|number| number.is_finite());
-        let Diagnostic { code, value, bound, index } = diagnostic;
-        Self {
-            code: code as u32,
-            name: code.name().into(),
-            value: finite(value),
-            bound: finite(bound),
-            index,
-            text: sentence(&diagnostic),
-        }
-    }
-}
+use hexad_client::operator::users::user_name;
+use hexad_core::control::signals::inputs::{Publishers, SetpointKind};
+use hexad_core::control::signals::limits::{Limit, LimitSet};
+use hexad_core::control::signals::state::State;
+use hexad_core::model::LEGS;
+use hexad_machine::config::Config;
 
 /// Source of status reports.
 pub struct StatusSource {
@@ -44,6 +29,8 @@ pub struct StatusSource {
     reloads: u64,
     /// Process of the client whose motion the daemon publishes.
     pub mover: Option<u32>,
+    /// Stops so far.
+    pub stops: Option<StopNumber>,
     /// Topics, opened at the first report; `None` if they cannot be opened: then the processes are unknown.
     topics: Option<Option<Topics>>,
 }
@@ -66,7 +53,7 @@ impl Topics {
 impl StatusSource {
     /// Source for a machine.
     pub fn new(loaded: Arc<Loaded>) -> Self {
-        Self { loaded, reloads: 0, mover: None, topics: None }
+        Self { loaded, reloads: 0, mover: None, stops: None, topics: None }
     }
 
     /// The configuration in force.
@@ -88,9 +75,10 @@ impl StatusSource {
             version: VERSION,
             result: RequestResult::Done,
             request: "status".into(),
+            id: None,
             state: state.name().into(),
             text: sentence(&diagnostic),
-            diagnostic: DiagnosticReport::from(diagnostic),
+            diagnostic: diagnostic_report(&diagnostic),
             status: Some(Box::new(report)),
         }
     }
@@ -107,6 +95,7 @@ impl StatusSource {
             version: BUILD.into(),
             machine: name.clone(),
             process_id: process::id(),
+            stops: self.stops,
             warnings: are_segments_deleted().then(|| SEGMENTS_DELETED.into()).into_iter().collect(),
             configuration: ConfigurationReport {
                 file: place.clone(),
@@ -220,9 +209,9 @@ fn process_report(publisher: u32, publishers: Publishers, mover: Option<u32>) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
-    use crate::control::signals::inputs::{Measurement, Setpoint};
-    use crate::model::task::TaskState;
+    use hexad_core::control::signals::inputs::{Measurement, Setpoint};
+    use hexad_core::model::task::TaskState;
+    use hexad_machine::config::Config;
 
     #[test]
     fn what_is_no_number_survives_json() {

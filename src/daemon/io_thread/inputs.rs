@@ -1,14 +1,15 @@
 //! Inputs of the controller: the newest message of each topic, and the pending request.
 
-use crate::control::signals::inputs::{Input, Measurement, Setpoint};
-use crate::control::signals::state::{MessageId, OperatorRequest, Request};
-use crate::daemon::cycle::CycleInput;
-use crate::daemon::reload::io_parameters::IoParameters;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::{
+use crate::cycle::CycleInput;
+use crate::reload::io_parameters::IoParameters;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{
     Bus, CommandMessage, LeasedSubscriber, MAX_REQUEST_AGE_NS, MeasuredMessage, PortError, Rejection,
     RejectionCounts, SetpointMessage, Subscriber,
 };
+use hexad_client::realtime::request_word::RequestWord;
+use hexad_core::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad_core::control::signals::state::{MessageId, OperatorRequest, Request};
 
 /// Request of the daemon itself before it ends. No message has this epoch.
 const STOP_BEFORE_END: OperatorRequest =
@@ -33,7 +34,7 @@ pub struct Inputs {
 
 /// Conditions for accepting publishers and requests.
 #[derive(Clone, Copy)]
-pub struct InputFilter {
+pub struct InputFilter<'a> {
     /// Whether the platform is under control. Then no publisher replaces a living one, and none that was
     /// ignored is accepted.
     pub has_control: bool,
@@ -41,6 +42,8 @@ pub struct InputFilter {
     pub answered_message: MessageId,
     /// Whether the daemon is to end. Then no request may begin control, and the platform comes to rest.
     pub is_ending: bool,
+    /// Counts the requests of the topic.
+    pub requests: &'a RequestWord,
     /// The request word. A new word replaces a pending request of the topic, because it is newer or has
     /// precedence.
     pub word: u64,
@@ -79,7 +82,7 @@ impl Inputs {
     }
 
     /// Receives the newest message of each topic; true if a measurement is among them.
-    pub fn receive(&mut self, filter: InputFilter) -> bool {
+    pub fn receive(&mut self, filter: InputFilter<'_>) -> bool {
         self.receive_requests(monotonic_ns, filter);
         self.receive_setpoint(filter.has_control);
         let measured = self.measured.receive_latest(filter.has_control);
@@ -120,8 +123,9 @@ impl Inputs {
     }
 
     /// Receives requests. Of the unanswered ones, the request of highest precedence is kept. The clock is
-    /// read after each message, because this thread may have been held just before it.
-    pub fn receive_requests(&mut self, clock: impl Fn() -> u64, filter: InputFilter) {
+    /// read after each message, because this thread may have been held just before it. Each is counted, so that a stop
+    /// of the topic also ends what waits for control elsewhere.
+    pub fn receive_requests(&mut self, clock: impl Fn() -> u64, filter: InputFilter<'_>) {
         let InputFilter { answered_message, is_ending, word, word_ns, .. } = filter;
         if word != self.word {
             (self.word, self.cycle.input.request) = (word, None);
@@ -130,6 +134,7 @@ impl Inputs {
         for _ in 0..REQUESTS_PER_ROUND {
             let Some(message) = self.commands.receive_from_any() else { break };
             let Some(request) = message.request() else { continue };
+            filter.requests.count(request.request as u32);
             let is_too_old = clock().abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
             let is_overtaken = message.header.time_ns < word_ns;
             if request.request.can_begin_control() && (is_ending || is_too_old || is_overtaken) {
@@ -177,6 +182,7 @@ mod tests {
                     has_control: false,
                     answered_message,
                     is_ending: false,
+                    requests: &RequestWord::default(),
                     word: 0,
                     word_ns: 0,
                 };
@@ -208,6 +214,7 @@ mod tests {
                     has_control: false,
                     answered_message: MessageId::default(),
                     is_ending: false,
+                    requests: &RequestWord::default(),
                     word,
                     word_ns,
                 };

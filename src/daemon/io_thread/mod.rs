@@ -6,8 +6,9 @@
 //! and block for a moment. The real-time thread then continues with older data, whose age it has from the
 //! time stamps.
 
-use crate::control::signals::state::MessageId;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use hexad_core::control::signals::state::MessageId;
+use std::sync::Arc;
 
 use heapless::spsc::Producer;
 
@@ -15,18 +16,19 @@ use self::inputs::{InputFilter, Inputs};
 use self::outputs::{OutputSettings, Outputs};
 use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
 use super::emergency_latch::LatchLink;
+use super::pose_gate::PoseGate;
 use super::reload::io_parameters::{IoParameters, IoParametersInForce};
 use super::snapshot::Snapshot;
 use super::supervision::Progress;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::lockstep::poll_until;
-use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, StatisticsMessage};
-use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
-use crate::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
-use crate::realtime::request_word::{self, RequestWord};
-use crate::realtime::triple_buffer::{Reader, Writer};
-use crate::realtime::usage::ThreadUsage;
-use crate::realtime::waiter::Waiter;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::lockstep::poll_until;
+use hexad_client::messages::{Bus, IoCounters, PortError, RejectionCounts, StatisticsMessage};
+use hexad_client::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
+use hexad_client::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
+use hexad_client::realtime::request_word::{self, RequestWord};
+use hexad_client::realtime::triple_buffer::{Reader, Writer};
+use hexad_client::realtime::usage::ThreadUsage;
+use hexad_client::realtime::waiter::Waiter;
 
 mod inputs;
 mod outputs;
@@ -70,6 +72,8 @@ pub struct IoLinks<'a> {
     pub may_end: &'a AtomicBool,
     /// Number of the last cycle that the log thread has passed on.
     pub passed_on: &'a AtomicU64,
+    /// Other poses in which the platform may be. In lock-step the next cycle waits for their search.
+    pub gate: Arc<PoseGate>,
 }
 
 /// Settings of the I/O thread.
@@ -225,12 +229,13 @@ impl IoThread<'_> {
             poll_until(&is_stopped, || {
                 self.publish_if_new();
                 let waiting = self.published.saturating_sub(self.links.passed_on.load(Ordering::Relaxed));
-                (self.published > before && waiting < RECORDS as u64 / 2).then_some(())
+                let has_room = waiting < RECORDS as u64 / 2 && !self.links.gate.is_searching();
+                (self.published > before && has_room).then_some(())
             });
         }
     }
 
-    fn input_filter(&self) -> InputFilter {
+    fn input_filter(&self) -> InputFilter<'static> {
         let is_ending = self.links.is_ending.load(Ordering::Relaxed);
         let word = self.links.word.load();
         let is_simulated = self.settings.timing.release == ReleaseMode::Lockstep;
@@ -239,6 +244,7 @@ impl IoThread<'_> {
             has_control: self.has_control,
             answered_message: self.answered_message,
             is_ending,
+            requests: self.links.word,
             word,
             word_ns,
         }

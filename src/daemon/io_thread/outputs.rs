@@ -2,17 +2,17 @@
 
 use heapless::spsc::Producer;
 
-use crate::control::controller::Output;
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::inputs::Setpoint;
-use crate::control::signals::state::State;
-use crate::control::supervision::in_position::InPosition;
-use crate::daemon::cycle::CycleOutput;
-use crate::daemon::reload::io_parameters::IoParameters;
-use crate::messages::clock::monotonic_ns;
-use crate::messages::{
+use crate::cycle::CycleOutput;
+use crate::reload::io_parameters::IoParameters;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{
     Bus, ForceMessage, IoCounters, PortError, Publisher, StatisticsMessage, StatusMessage,
 };
+use hexad_core::control::controller::Output;
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::inputs::Setpoint;
+use hexad_core::control::signals::state::State;
+use hexad_core::control::supervision::in_position::InPosition;
 
 /// Publishers of the daemon.
 pub struct Outputs {

@@ -4,14 +4,15 @@ use super::job::{End, Job, JobFeed, MotionEvent};
 use super::order::{GotoOrder, MotionOrder};
 use super::plan::{GotoPlan, window};
 use super::tool_stream::ToolStream;
-use crate::control::constants::Constants;
-use crate::control::supervision::in_position::{InPosition, InPositionWindow};
-use crate::daemon::target_source::{
+use crate::target_source::{
     Deviation, Feed as _, Observation, TargetError, TargetSource, has_received, is_reached,
 };
-use crate::messages::Bus;
-use crate::model::rigid::Twist;
-use crate::model::task::pose_of;
+use hexad_client::messages::Bus;
+use hexad_core::control::constants::Constants;
+use hexad_core::control::supervision::in_position::{InPosition, InPositionWindow};
+use hexad_core::model::rigid::Twist;
+use hexad_core::model::task::pose_of;
+use hexad_machine::analysis::target_motion::TargetRefusal;
 
 /// Longest time of the motion, as a multiple of the computed time, and an addition \[s\].
 const LONGEST_SHARE: f64 = 1.5;
@@ -28,7 +29,11 @@ pub fn run(
     let config = &job.loaded.config;
     let MotionOrder { coordinates, is_straight, may_engage, .. } = &job.order;
     let (seen, _) = feed.observe()?;
-    let plan = GotoPlan::new(config, constants, order, coordinates, *is_straight, seen)?;
+    let go_on = || job.end().is_none();
+    let plan = match GotoPlan::new(config, constants, order, coordinates, *is_straight, seen, go_on) {
+        Err(TargetError::Refused(TargetRefusal::Interrupted)) => return Ok(None),
+        plan => plan?,
+    };
     let mut source = job.source(feed, bus, *may_engage)?;
     source.set_speed(order.speed);
     job.send(MotionEvent::Accepted(format!("{:.2} s to the target", plan.motion.duration_s)));

@@ -7,16 +7,16 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 
 use super::order::MotionOrder;
 use super::snapshot_feed::SnapshotFeed;
-use crate::config::coordinates::Coordinates;
-use crate::control::constants::Constants;
-use crate::daemon::process_names::{command, named};
-use crate::daemon::reload::Loaded;
-use crate::daemon::start::{REQUESTS_PRIORITY, prepare_support};
-use crate::daemon::target_source::{
+use crate::process_names::{command, named};
+use crate::reload::Loaded;
+use crate::start::{REQUESTS_PRIORITY, prepare_support};
+use crate::target_source::{
     Feed, Observation, TargetError, TargetSource, has_received, is_reached, reachable_target,
 };
-use crate::messages::{Bus, SetpointMessage};
-use crate::operator::protocol::RequestResult;
+use hexad_client::messages::{Bus, SetpointMessage};
+use hexad_client::operator::protocol::RequestResult;
+use hexad_core::control::constants::Constants;
+use hexad_machine::config::coordinates::Coordinates;
 
 /// Newest request of a jog.
 #[derive(Clone, Debug)]

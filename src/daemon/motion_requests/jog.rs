@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use super::job::{Job, JobFeed, Jog, MotionEvent};
 use super::jog_target::JogTarget;
-use crate::control::constants::Constants;
-use crate::daemon::target_source::{TargetError, is_reached};
-use crate::messages::Bus;
-use crate::messages::clock::monotonic_ns;
-use crate::model::task::pose_of;
+use crate::target_source::{TargetError, is_reached};
+use hexad_client::messages::Bus;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_core::control::constants::Constants;
+use hexad_core::model::task::pose_of;
 
 /// Time after a request at which motion ends unless another one arrives \[ns\]: twice the repetition interval of a slow keyboard.
 const REQUEST_TIMEOUT_NS: u64 = 200_000_000;

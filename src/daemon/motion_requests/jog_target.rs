@@ -1,12 +1,12 @@
 //! Target moved by requests. It leads the reference by at most the reference's stopping distance, and stays in
 //! the workspace.
 
-use crate::analysis::target_motion::{TargetRefusal, WorkspaceBound, check_target};
-use crate::config::coordinates::Coordinates;
-use crate::control::constants::Constants;
-use crate::control::signals::limits::DerivativeLimits;
-use crate::model::rigid::{Pose, Twist};
-use crate::model::task::pose_of;
+use hexad_core::control::constants::Constants;
+use hexad_core::control::signals::limits::DerivativeLimits;
+use hexad_core::model::rigid::{Pose, Twist};
+use hexad_core::model::task::pose_of;
+use hexad_machine::analysis::target_motion::{WorkspaceBound, check_target};
+use hexad_machine::config::coordinates::Coordinates;
 
 /// Age of the reference that is compared with the target \[s\]: of a snapshot on a busy host.
 const REFERENCE_AGE_S: f64 = 0.05;
@@ -49,13 +49,9 @@ impl<'a> JogTarget<'a> {
         if self.lead(reference, &pose, &moved, time_s) > 1.0 {
             return;
         }
-        match check_target(self.constants, &pose) {
-            Ok(()) => (self.x, self.blocked) = (x, None),
-            Err(
-                TargetRefusal::Target(bound) | TargetRefusal::Way { bound, .. } | TargetRefusal::Start(bound),
-            ) => {
-                self.blocked = Some(bound);
-            }
+        self.blocked = check_target(self.constants, &pose).err();
+        if self.blocked.is_none() {
+            self.x = x;
         }
     }
 
@@ -82,8 +78,8 @@ impl<'a> JogTarget<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
-    use crate::daemon::constants;
+    use crate::constants;
+    use hexad_machine::config::Config;
 
     const MACHINE: &str = include_str!("../../../config/fried2008.toml");
 

@@ -13,9 +13,9 @@ use self::snapshot_feed::SnapshotFeed;
 use super::parameters::constants;
 use super::snapshot::Snapshot;
 use super::target_source::TargetError;
-use crate::messages::Bus;
-use crate::realtime::setup::scheduling;
-use crate::realtime::triple_buffer::Reader;
+use hexad_client::messages::Bus;
+use hexad_client::realtime::setup::scheduling;
+use hexad_client::realtime::triple_buffer::Reader;
 
 mod goto;
 mod hold;

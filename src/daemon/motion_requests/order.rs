@@ -1,15 +1,15 @@
 //! A request for a motion, validated. Each error names field, value, bound and remedy.
 
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::config::frames::FrameKind;
-use crate::control::signals::limits::Limits;
-use crate::model::rigid::Pose;
-use crate::model::task::pose_of;
-use crate::motion::frames::Frames;
-use crate::motion::rotation_order::RotationOrder;
-use crate::operator::motion_fields::{FrameField, GOTO, HOLD, JOG, RateFields, TargetFields};
-use crate::operator::protocol::RequestLine;
+use hexad_client::operator::motion_fields::{FrameField, GOTO, HOLD, JOG, RateFields, TargetFields};
+use hexad_client::operator::protocol::RequestLine;
+use hexad_core::control::signals::limits::Limits;
+use hexad_core::model::rigid::Pose;
+use hexad_core::model::task::pose_of;
+use hexad_core::motion::frames::Frames;
+use hexad_core::motion::rotation_order::RotationOrder;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::config::frames::FrameKind;
 
 /// Largest coordinate of a request \[m\], \[rad\]: beyond every machine.
 const MAX_COORDINATE: f64 = 1000.0;

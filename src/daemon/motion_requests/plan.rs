@@ -2,17 +2,17 @@
 
 use super::order::GotoOrder;
 use super::tool_stream::ToolStream;
-use crate::analysis::target_motion::{TargetMotion, TargetRefusal, target_motion};
-use crate::analysis::tool_motion::ToolMotion;
-use crate::config::Config;
-use crate::config::coordinates::Coordinates;
-use crate::control::constants::Constants;
-use crate::control::supervision::in_position::InPositionWindow;
-use crate::daemon::target_source::{Observation, TargetError, is_reached, reachable_target};
-use crate::model::task::pose_of;
-use crate::motion::tool_path::ToolPath;
-use crate::output::coordinate_rows::{heading, row};
-use crate::output::numbers::MotionDigits;
+use crate::target_source::{Observation, TargetError, is_reached, reachable_target};
+use hexad_core::control::constants::Constants;
+use hexad_core::control::supervision::in_position::InPositionWindow;
+use hexad_core::model::task::pose_of;
+use hexad_core::motion::tool_path::ToolPath;
+use hexad_machine::analysis::target_motion::{TargetMotion, TargetRefusal, target_motion};
+use hexad_machine::analysis::tool_motion::ToolMotion;
+use hexad_machine::config::Config;
+use hexad_machine::config::coordinates::Coordinates;
+use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::numbers::MotionDigits;
 
 /// Motion to a target.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub struct GotoPlan {
 
 impl GotoPlan {
     /// Plans from the observed platform. A motion from a target that is reached begins there, without the noise of its
-    /// measurement.
+    /// measurement. `go_on` says whether to go on.
     pub fn new(
         config: &Config,
         constants: &Constants,
@@ -37,6 +37,7 @@ impl GotoPlan {
         coordinates: &Coordinates,
         is_straight: bool,
         seen: &Observation,
+        go_on: impl Fn() -> bool,
     ) -> Result<Self, TargetError> {
         let x = seen.reference.ok_or_else(|| TargetError::UnknownPose(seen.text.clone()))?;
         let held = reachable_target(constants, seen).unwrap_or(x);
@@ -48,18 +49,20 @@ impl GotoPlan {
         }
         let to = coordinates.platform_x(&wanted);
         let refused = |refusal: TargetRefusal| match coordinates.is_empty() {
+            _ if refusal == TargetRefusal::Interrupted => TargetError::Refused(refusal),
             true => TargetError::Refused(refusal),
             false => TargetError::RefusedInFrames(refusal, both_coordinates(config, coordinates, &to)),
         };
         let poses = [from, to].map(|x| pose_of(&x));
         let [start, end] = &poses;
         if !is_straight {
-            let motion = target_motion(constants, start, end, order.speed, |_, _| ()).map_err(refused)?;
+            let motion =
+                target_motion(constants, start, end, order.speed, |_, _| go_on()).map_err(refused)?;
             return Ok(Self { from, to, motion, stream: None });
         }
         let path = ToolPath::new(coordinates.frames(), start, end);
         let fastest = ToolMotion::fastest(constants, path, order.speed).map_err(refused)?;
-        let stream = ToolStream::new(config, fastest)?;
+        let stream = ToolStream::new(config, fastest, go_on)?;
         Ok(Self { from, to, motion: stream.motion().survey(constants), stream: Some(stream) })
     }
 }

@@ -1,8 +1,8 @@
 //! Observations of the platform from the snapshots that the control thread passes on.
 
-use crate::daemon::snapshot::Snapshot;
-use crate::daemon::target_source::Observation;
-use crate::realtime::triple_buffer::Reader;
+use crate::snapshot::Snapshot;
+use crate::target_source::Observation;
+use hexad_client::realtime::triple_buffer::Reader;
 
 /// Least time between two observations from which a velocity is computed \[ns\]: a cycle of the control thread on a busy host.
 const INTERVAL_NS: u64 = 20_000_000;

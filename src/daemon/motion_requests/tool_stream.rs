@@ -1,12 +1,15 @@
 //! Setpoints along the path of a tool: a target alone does not keep rotation and translation in proportion.
 
-use crate::analysis::tool_motion::ToolMotion;
-use crate::config::Config;
-use crate::control::signals::limits::Limits;
-use crate::daemon::precheck::Precheck;
-use crate::daemon::rate_change::RateChange;
-use crate::daemon::target_source::TargetError;
-use crate::model::task::TaskState;
+use core::ops::ControlFlow;
+
+use crate::precheck::Precheck;
+use crate::rate_change::RateChange;
+use crate::target_source::TargetError;
+use hexad_core::control::signals::limits::Limits;
+use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::target_motion::TargetRefusal;
+use hexad_machine::analysis::tool_motion::ToolMotion;
+use hexad_machine::config::Config;
 
 /// Factor to the next longer duration, and number of durations: up to 30 times the shortest.
 const FACTOR: f64 = 1.25;
@@ -28,8 +31,8 @@ pub struct ToolStream {
 }
 
 impl ToolStream {
-    /// The motion, as much slower as the daemon needs to follow it.
-    pub fn new(config: &Config, fastest: ToolMotion) -> Result<Self, TargetError> {
+    /// The motion, as much slower as the daemon needs to follow it. `go_on` says whether to go on.
+    pub fn new(config: &Config, fastest: ToolMotion, go_on: impl Fn() -> bool) -> Result<Self, TargetError> {
         let near = config.machine.home;
         let has_rates = |state: TaskState| libm::cos(state.x.y).abs() >= MIN_COS_BETA;
         if !fastest.samples().all(|(t, _)| fastest.task_state(t, &near).is_some_and(has_rates)) {
@@ -41,7 +44,15 @@ impl ToolStream {
         for k in 0..DURATIONS {
             let motion = fastest.slower(FACTOR.powi(k));
             let stream = Self { motion, near, limits, began_ns: None, slowdown: None };
-            refused = precheck.refusal(|t| stream.task(t), [0.0, motion.duration_s]);
+            refused = None;
+            let refuse = |refusal| {
+                refused = Some(refusal);
+                ControlFlow::Break(())
+            };
+            precheck.follow(|t| stream.task(t), [0.0, motion.duration_s], refuse, |_| go_on());
+            if !go_on() {
+                return Err(TargetRefusal::Interrupted.into());
+            }
             if refused.is_none() {
                 return Ok(stream);
             }
@@ -90,11 +101,11 @@ fn seconds(from_ns: u64, to_ns: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::daemon::constants;
-    use crate::model::rigid::Pose;
-    use crate::model::task::pose_of;
-    use crate::motion::frames::Frames;
-    use crate::motion::tool_path::ToolPath;
+    use crate::constants;
+    use hexad_core::model::rigid::Pose;
+    use hexad_core::model::task::pose_of;
+    use hexad_core::motion::frames::Frames;
+    use hexad_core::motion::tool_path::ToolPath;
     use nalgebra::Vector3;
 
     const MACHINE: &str = include_str!("../../../config/fried2008.toml");
@@ -111,7 +122,7 @@ mod tests {
         let turned = Pose { rotation: pose_of(&[0.05, 0.08, -0.1, 0.0, 0.0, 0.0]).rotation, ..home };
         let path = ToolPath::new(frames, &config.machine.home_pose(), &frames.platform_pose(&turned));
         let fastest = ToolMotion::fastest(&constants, path, 1.0).unwrap();
-        let planned = ToolStream::new(&config, fastest).unwrap();
+        let planned = ToolStream::new(&config, fastest, || true).unwrap();
         assert!(planned.motion.duration_s < 1.3 * fastest.duration_s, "{}", planned.motion.duration_s);
         for interrupted_ns in [u64::MAX, 0, 300_000_000] {
             let (mut stream, mut resting, mut last) = (planned, None, None);

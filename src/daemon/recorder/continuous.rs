@@ -11,9 +11,9 @@ use super::Context;
 use super::folder::Folder;
 use super::stream::Stream;
 use super::tape::Tape;
-use crate::messages::CycleMessage;
 use crate::recording::RecordingError;
 use crate::recording::file::RecordingFile;
+use hexad_client::messages::CycleMessage;
 
 /// Time between two attempts while the disk accepts no data \[s\].
 const RETRY_S: u64 = 2;

@@ -1,8 +1,8 @@
 //! Detection of faults that end control, and of the end of the window around each.
 
-use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::state::State;
-use crate::messages::CycleMessage;
+use hexad_client::messages::CycleMessage;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::State;
 
 /// Detector of the cycles of faults.
 pub struct FaultWatch {
@@ -47,7 +47,7 @@ impl FaultWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::DiagnosticRecord;
+    use hexad_client::messages::DiagnosticRecord;
 
     #[test]
     fn each_fault_that_ends_control_is_due_once_when_its_window_is_complete() {

@@ -24,12 +24,13 @@ pub use self::windows::WindowOrder;
 use self::windows::Windows;
 use super::memory_queue::MemoryConsumer;
 use super::reload::Loaded;
-use crate::messages::CycleMessage;
-use crate::messages::clock::monotonic_ns;
-use crate::realtime::setup::denormals;
-use crate::realtime::usage::ThreadUsage;
 use crate::recording::RunInfo;
 use crate::recording::scene::Scene;
+use crate::version;
+use hexad_client::messages::CycleMessage;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::realtime::setup::denormals;
+use hexad_client::realtime::usage::ThreadUsage;
 
 mod continuous;
 mod fault_watch;
@@ -251,8 +252,8 @@ fn info(Loaded { config, fidelity, .. }: &Loaded) -> RunInfo {
         SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |it| it.as_nanos() as u64);
     RunInfo {
         name: config.name.clone(),
-        version: env!("CARGO_PKG_VERSION").into(),
-        commit: env!("HEXAD_COMMIT").into(),
+        version: version::NUMBER.into(),
+        commit: version::COMMIT.into(),
         instruction_set: instruction_set(config.machine.level),
         fidelity: fidelity.name().into(),
         configuration: config.text.clone(),

@@ -2,9 +2,9 @@
 
 use tracing::warn;
 
-use crate::control::controller::{Controller, Memory};
-use crate::messages::CycleMessage;
-use crate::messages::layout::Declared as _;
+use hexad_client::messages::CycleMessage;
+use hexad_client::messages::layout::Declared as _;
+use hexad_core::control::controller::{Controller, Memory};
 
 /// Repeats the cycles of the real-time thread. After a missing cycle it resumes from a memory of that thread.
 pub struct Replica {

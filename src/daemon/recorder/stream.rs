@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::Context;
 use super::tape::Tape;
-use crate::messages::{CycleMessage, GapMessage};
 use crate::recording::file::RecordingFile;
 use crate::recording::{RecordingError, memory_bytes};
+use hexad_client::messages::{CycleMessage, GapMessage};
 
 /// Rate of frames and joints \[1/s\].
 const SCENES_PER_S: u64 = 100;

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use crate::control::controller::Memory;
-use crate::messages::CycleMessage;
+use hexad_client::messages::CycleMessage;
+use hexad_core::control::controller::Memory;
 
 /// Length of the tape \[s\].
 const TAPE_S: f64 = 30.0;

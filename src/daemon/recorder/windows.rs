@@ -11,9 +11,9 @@ use super::fault_watch::FaultWatch;
 use super::folder::Folder;
 use super::stream::Stream;
 use super::tape::Tape;
-use crate::messages::CycleMessage;
 use crate::recording::RecordingError;
 use crate::recording::file::RecordingFile;
+use hexad_client::messages::CycleMessage;
 
 /// Cycles of a window written in one step: a millisecond of effort.
 const CYCLES_PER_STEP: usize = 256;

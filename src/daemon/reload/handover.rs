@@ -15,9 +15,9 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::Loaded;
 use super::io_parameters::{IoParameters, IoParametersInForce};
-use crate::control::controller::Controller;
-use crate::control::signals::state::State;
-use crate::messages::MAX_REQUEST_AGE_NS;
+use hexad_client::messages::MAX_REQUEST_AGE_NS;
+use hexad_core::control::controller::Controller;
+use hexad_core::control::signals::state::State;
 
 /// Length of a queue for one offer: a queue holds one element less than its length.
 pub const LENGTH: usize = 2;
@@ -115,7 +115,7 @@ impl<'q, 'o> Handover<'q, 'o> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
+    use hexad_machine::config::Config;
 
     #[test]
     fn an_offer_is_taken_while_it_is_fresh() {

@@ -3,9 +3,9 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use crate::config::deployment::Deployment;
-use crate::control::supervision::in_position::InPositionWindow;
-use crate::daemon::parameters::nanoseconds;
+use crate::parameters::nanoseconds;
+use hexad_core::control::supervision::in_position::InPositionWindow;
+use hexad_machine::config::deployment::Deployment;
 
 /// Parameters that a reload may change.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

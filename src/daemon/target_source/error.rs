@@ -4,14 +4,14 @@ use core::fmt;
 
 use nalgebra::Vector3;
 
-use crate::analysis::target_motion::TargetRefusal;
-use crate::control::signals::state::State;
-use crate::control::supervision::in_position::InPositionWindow;
-use crate::messages::PortError;
-use crate::model::rigid::Twist;
-use crate::operator::OperatorError;
-use crate::operator::protocol::RequestResult;
-use crate::output::numbers::significant;
+use hexad_client::messages::PortError;
+use hexad_client::operator::OperatorError;
+use hexad_client::operator::protocol::RequestResult;
+use hexad_core::control::signals::state::State;
+use hexad_core::control::supervision::in_position::InPositionWindow;
+use hexad_core::model::rigid::Twist;
+use hexad_machine::analysis::target_motion::TargetRefusal;
+use hexad_machine::text::numbers::significant;
 
 /// Reason why a target is not published, or not followed.
 #[derive(Debug, thiserror::Error)]

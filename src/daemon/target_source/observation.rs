@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 
-use crate::control::signals::inputs::SetpointKind;
-use crate::control::signals::state::State;
-use crate::daemon::process_names::sentence;
-use crate::daemon::snapshot::Snapshot;
-use crate::model::rigid::Twist;
-use crate::model::task::{pose_of, task_coordinates};
-use crate::operator::protocol::AnswerLine;
+use crate::process_names::sentence;
+use crate::snapshot::Snapshot;
+use hexad_client::operator::protocol::AnswerLine;
+use hexad_core::control::signals::inputs::SetpointKind;
+use hexad_core::control::signals::state::State;
+use hexad_core::model::rigid::Twist;
+use hexad_core::model::task::{pose_of, task_coordinates};
 
 /// State and poses at an instant.
 #[derive(Clone, Debug, Default)]
@@ -33,7 +33,7 @@ pub struct Observation {
 
 impl Observation {
     /// Observation of a snapshot. `home` selects the angles.
-    pub(in crate::daemon) fn of_snapshot(snapshot: &Snapshot, home: &[f64; 6]) -> Self {
+    pub(crate) fn of_snapshot(snapshot: &Snapshot, home: &[f64; 6]) -> Self {
         let status = &snapshot.status;
         let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
         let setpoint = snapshot.setpoint.filter(|setpoint| setpoint.task.is_finite());

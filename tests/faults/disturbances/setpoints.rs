@@ -139,7 +139,7 @@ pub fn second_source(m: &mut Moment) {
 /// 100 Hz, and stamped up to 0.2 ms early or late.
 pub fn slow_and_jittery(m: &mut Moment) {
     let newest = m.cycle - m.cycle % 10;
-    let back_ns = (m.cycle - newest) * m.world.rig.period_ns;
+    let back_ns = (m.cycle - newest) * m.world.rig.parameters.period_ns;
     let jitter = (2e5 * noise(newest)) as i64;
     let instant_ns = m.world.rig.now_ns - back_ns;
     let task = m.world.task(instant_ns);

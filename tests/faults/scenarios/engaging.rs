@@ -48,7 +48,7 @@ fn off_and_engage_in_motion() {
     let mut world = moving_slowly();
     world.ask(Request::Off);
     world.run(3);
-    let speed = world.rig.simulator.state().twist.linear.norm();
+    let speed = world.rig.simulator().state().twist.linear.norm();
     assert!(speed > 0.05, "{speed}");
     world.ask(Request::Engage);
     world.until(|output| output.state == State::Active);

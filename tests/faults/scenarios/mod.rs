@@ -4,8 +4,6 @@
 //! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
 
 use super::cells::{Bounds, GENTLE};
-use super::common::observed::Rates;
-use super::common::rig::{Rig, parameters};
 use super::pictures::{Picture, draw};
 use super::recording::Peaks;
 use super::situations::{Situation, machine};
@@ -15,6 +13,7 @@ use hexad::control::parameters::ViolationPolicy;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
+use hexad_support::rig::{Rates, Rig, parameters};
 use nalgebra::Vector6;
 
 mod engaging;

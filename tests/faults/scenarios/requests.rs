@@ -45,7 +45,7 @@ fn off_and_park_in_motion() {
     let mut world = moving_slowly();
     world.ask(Request::Off);
     world.run(10);
-    let speed = world.rig.simulator.state().twist.linear.norm();
+    let speed = world.rig.simulator().state().twist.linear.norm();
     assert!(speed > 0.05, "{speed}");
     world.ask(Request::Park);
     world.until(|output| output.state == State::Off);

@@ -12,7 +12,7 @@ use hexad::model::task::TaskState;
 use super::{line_number, lines};
 
 /// What messages call the input.
-const PLACE: &str = "fuzz.toml";
+pub const PLACE: &str = "fuzz.toml";
 
 /// Violations shown at most, and how many there are beyond.
 const MAX_VIOLATIONS: usize = 100 + 1;
@@ -28,7 +28,7 @@ pub fn hold(input: &[u8]) -> bool {
 }
 
 /// A line for each violation, in the order of the lines, with place, value and bound.
-fn check_refusal(error: &ConfigError, input: &[u8]) {
+pub fn check_refusal(error: &ConfigError, input: &[u8]) {
     let ConfigError::Invalid { violations, .. } = error else { panic!("bytes can be read: {error}") };
     assert!((1..=MAX_VIOLATIONS).contains(&violations.len()), "{} violations", violations.len());
     assert!(violations.is_sorted_by_key(|violation| violation.line));
@@ -61,10 +61,7 @@ fn check_machine(config: &Config) {
     let Config { name, machine, deployment, .. } = config;
     assert!((1..=64).contains(&name.len()), "{name}");
     for (what, debug) in [("machine", format!("{machine:?}")), ("deployment", format!("{deployment:?}"))] {
-        assert!(
-            !debug.contains("NaN") && !debug.contains("inf"),
-            "{what} with a number that is none: {debug}"
-        );
+        assert!(!debug.contains("NaN") && !debug.contains("inf"), "{what}: {debug}");
     }
     let actuator = &machine.actuator;
     assert!(0.0 < actuator.min_length && actuator.min_length < actuator.max_length);

@@ -11,8 +11,8 @@ use hexad::commands::orientation::OrientationFormat;
 use hexad::config::Config;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::Machine;
-use hexad::output::csv_table::{NumberTable, TableError, legs, length_columns, trajectory_columns};
-use hexad::output::csv_writer::CsvWriter;
+use hexad::text::csv_table::{NumberTable, TableError, legs, length_columns, trajectory_columns};
+use hexad::text::csv_writer::CsvWriter;
 
 use super::{line_number, lines};
 
@@ -52,11 +52,11 @@ pub fn hold(input: &[u8]) -> bool {
     let lengths = read(&length_columns(), &legs("length_rate"));
     if let Some(table) = &lengths {
         let with_rates = table.rows().first().is_some_and(|row| row.len() > length_columns().len());
-        let width = if with_rates { 9 + 6 } else { 9 };
+        let width = if with_rates { 10 + 6 } else { 10 };
         for start in [StartPose::Previous, StartPose::Home] {
             check_output(
                 table,
-                &mut forward_kinematics(&MACHINE, start, OrientationFormat::OF_X, table).0,
+                &mut forward_kinematics(&MACHINE, start, OrientationFormat::OF_X, table).output,
                 width,
             );
         }

@@ -222,7 +222,7 @@ impl<'a> Play<'a> {
             }
             if force.iter().any(|force| force.abs() == limit) {
                 assert!(
-                    active_limits.contains(Limit::Force) || active_limits.contains(Limit::ForceRate),
+                    [Limit::Force, Limit::ForceRate].iter().any(|it| active_limits.contains(*it)),
                     "{output:?}"
                 );
             }

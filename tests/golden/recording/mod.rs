@@ -4,11 +4,11 @@
 //! anew where none of them shows what a change is about: better a new one than another content under an old name.
 //! `HEXAD_RECORD_STREAMS=NAME,NAME cargo test --test shipped -- --ignored record_streams`
 
-use std::{env, fs};
+use std::env;
 
-use super::stream::{Stream, folder};
-use crate::common::edited::{deployed_table, set, table};
-use crate::common::{MACHINES, data};
+use super::stream::Stream;
+use hexad_support::edited::{deployed_table, set, table};
+use hexad_support::{MACHINES, data};
 
 mod faults;
 mod loops;
@@ -43,14 +43,7 @@ fn record_streams() {
     for name in names.split(',') {
         let script =
             scripts.iter().find(|script| script.0 == name).unwrap_or_else(|| panic!("no stream {name}"));
-        let configuration = configuration(script);
-        let inputs = Recorder::record(&configuration, script.3);
-        let stream = Stream { name: name.into(), configuration, inputs };
-        let bytes = stream.bytes();
-        println!("{name}: {} bytes", bytes.len());
-        let file = folder().join(name);
-        fs::create_dir_all(folder()).unwrap();
-        fs::write(file.with_extension("bin"), bytes).unwrap();
-        fs::write(file.with_extension("toml"), &stream.configuration).unwrap();
+        let recorder = Recorder::record(&configuration(script), script.3);
+        Stream::new(&recorder.config, recorder.inputs).write();
     }
 }

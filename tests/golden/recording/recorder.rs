@@ -1,6 +1,5 @@
 //! A controller, simulated hardware and a source of setpoints. Every input of the controller is kept.
 
-use hexad::commands::plant::hardware;
 use hexad::config::Config;
 use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
@@ -16,14 +15,12 @@ use hexad::plant::hardware::Hardware;
 use nalgebra::Vector6;
 
 use super::super::stream::CYCLES;
-use crate::common::rig::parameters;
+use hexad_support::rig::{START_NS, parameters};
 
-/// The first cycle; the clock of a computer that has been up for a while.
-const START_NS: u64 = 86_400_000_000_000;
 /// From the release to the force, as a ratio of the period.
 const FORCE_DELAY: f64 = 0.1;
 /// Binary digits after the point that numbers of an input keep: poses and lengths to 0.5 nm, their first and second derivatives,
-/// forces. Smooth motions take a byte or two per number then.
+/// forces. The remaining bytes of a number are zero then, which take nothing in a file.
 const POSE_DIGITS: i32 = 31;
 const RATE_DIGITS: i32 = 25;
 const ACCELERATION_DIGITS: i32 = 19;
@@ -89,18 +86,18 @@ pub struct Recorder {
     asked: Option<OperatorRequest>,
     force: Option<[f64; LEGS]>,
     random: Random,
-    inputs: Vec<Input>,
+    pub inputs: Vec<Input>,
 }
 
 impl Recorder {
-    /// Inputs of a script; what it has not filled goes on as it was.
-    pub fn record(configuration: &str, script: fn(&mut Self)) -> Vec<Input> {
+    /// With the inputs of a script; what it has not filled goes on as it was.
+    pub fn record(configuration: &str, script: fn(&mut Self)) -> Self {
         let config = Config::parse(configuration, "configuration").unwrap_or_else(|error| panic!("{error}"));
         let parameters = parameters(&config);
         let home = TaskState::at_rest(config.machine.home);
         let mut recorder = Self {
             controller: Controller::new(&config.machine, parameters),
-            hardware: hardware(&config),
+            hardware: config.deployment.plant.hardware(&config.machine),
             output: Output::default(),
             source: Box::new(move |_| Some(home)),
             drives: Box::new(|_, force| Some(force)),
@@ -120,7 +117,7 @@ impl Recorder {
         };
         script(&mut recorder);
         recorder.run(CYCLES as u64);
-        recorder.inputs
+        recorder
     }
 
     pub fn run(&mut self, cycles: u64) {

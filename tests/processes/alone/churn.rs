@@ -11,13 +11,12 @@ use hexad::control::signals::state::State;
 use hexad::daemon::report::Report;
 use hexad::messages::{Bus, StatisticsMessage, StatusMessage, Subscriber};
 
-use crate::common::certificate::Certificate;
-use crate::common::not_run::lacking;
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::peer::Controlled;
 use crate::support::threads::Thread;
-use crate::support::turns;
+use hexad_support::certificate::Certificate;
+use hexad_support::not_run::lacking;
 
 const RATE: &str = "[realtime]\nrate_hz = 4000.0\n";
 const KILLS_PER_S: u32 = 10;
@@ -37,12 +36,13 @@ const ROUNDS: usize = 12;
 const PER_LINE: u64 = 20;
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn certificate_the_real_time_thread_does_not_notice_peers_that_die() {
-    let _turn = turns::alone();
     let certificate = Certificate::new("peers that die", ROUND_S, LONG_ROUND_S);
     let [calm, disturbed] =
         ["calm", "disturbed"].map(|name| Machine::with(name, &format!("{RATE}{PATIENT}")));
-    let (mut calm, mut disturbed) = (Observed::start(calm), Observed::start(disturbed));
+    let (mut calm, mut disturbed) = (Rig::start(calm), Rig::start(disturbed));
     if calm.controlled.daemon.words().contains("no locked memory") {
         lacking("locked memory");
         return;
@@ -95,7 +95,7 @@ fn median(values: &[u64]) -> u64 {
 }
 
 /// One daemon and what its status said.
-struct Observed {
+struct Rig {
     controlled: Controlled,
     statuses: Subscriber<StatusMessage>,
     timings: Subscriber<StatisticsMessage>,
@@ -107,7 +107,7 @@ struct Observed {
     faults: [[u64; 2]; 2],
 }
 
-impl Observed {
+impl Rig {
     /// Returns when everybody is there and the first seconds are over, with all that is only done once.
     fn start(machine: Machine) -> Self {
         let controlled = Controlled::start(machine);
@@ -147,9 +147,7 @@ impl Observed {
     }
 
     fn ends(self) {
-        let Controlled { peer: _peer, daemon, plant, machine } = self.controlled;
-        let words = daemon.stops_on("TERM", HANG).stderr;
-        plant.stops_on("TERM", HANG);
+        let (words, machine) = self.controlled.finish();
         let report = Report::read(&machine.path("report.json")).expect("the report");
         println!(
             "{}: {} cycles, {:?}, {:?}",
@@ -168,7 +166,7 @@ impl Observed {
 
 /// From when everybody was there: neither the real-time thread nor the io thread allocates; no page is met
 /// for the first time, by the log thread neither.
-fn among_constant_peers_nothing_is_used(calm: &Observed) {
+fn among_constant_peers_nothing_is_used(calm: &Rig) {
     let (first, last) = (&calm.first, &calm.last);
     assert!(last.counters.cycles > first.counters.cycles && last.state == State::Active as u32, "{last:#?}");
     assert_eq!(

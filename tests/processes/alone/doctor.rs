@@ -9,10 +9,9 @@ use hexad::commands::doctor::facts::{Assessment, Fact};
 use hexad::commands::doctor::verdict::Feasibility;
 use hexad::realtime::cyclic::ReleaseMode;
 
-use crate::support::children::{Ended, HANG, Hexad, run};
+use crate::support::children::{Ended, Hexad, run};
 use crate::support::machine::Machine;
 use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, cannot, wrapped};
-use crate::support::turns;
 
 /// Runs it for a second, before the words of `more`.
 fn doctor(machine: &Machine, more: &[&str]) -> Ended {
@@ -37,8 +36,9 @@ fn fact<'a>(diagnosis: &'a Diagnosis, name: &str) -> &'a Fact {
 }
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn text_and_json_and_exit_code_agree() {
-    let _turn = turns::alone();
     let machine = Machine::patient("doctor");
     let Ended { status, stdout, stderr } = doctor(&machine, &[]);
     let diagnosis = diagnosis(&machine);
@@ -83,8 +83,9 @@ fn text_and_json_and_exit_code_agree() {
 }
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn what_is_configured_is_what_is_judged() {
-    let _turn = turns::alone();
     let machine = Machine::with(
         "doctor-configured",
         "[realtime]\nrate_hz = 500\nrelease = \"hybrid\"\nmax_lead_us = 300\ncpu = 0\nlate_wakeup_us = 700",
@@ -111,17 +112,18 @@ fn what_is_configured_is_what_is_judged() {
 }
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn nobody_is_told_what_is_lacking() {
     let nobody = [NO_LIMITS_RAISED, AS_NOBODY];
     if cannot(&nobody) {
         return;
     }
-    let _turn = turns::alone();
     let machine = Machine::with("doctor-nobody", "[realtime]\nrequire_realtime = true\nlate_wakeup_us = 400");
     let mut command = wrapped(&machine, &nobody);
     command.args(["doctor", "--seconds", "1", "--disturb", "--config"]).arg(&machine.file);
     command.arg("--report").arg(machine.path("doctor.json"));
-    let Ended { status, stderr, .. } = Hexad::spawn(&machine, "doctor", command).ends_within(HANG);
+    let Ended { status, stderr, .. } = Hexad::spawn(&machine, "doctor", command).ends();
     assert_eq!(status.code(), Some(1), "{stderr}");
     assert_eq!(stderr, "hexad: 1000 Hz by sleep is not possible on this host\n");
     let diagnosis = diagnosis(&machine);

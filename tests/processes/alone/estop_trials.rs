@@ -22,8 +22,6 @@ use hexad::realtime::request_word;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::common::certificate::Certificate;
-use crate::common::not_run::lacking;
 use crate::support::button::Button;
 use crate::support::children::HANG;
 use crate::support::disturbance::{Disturbance, Situation};
@@ -34,8 +32,9 @@ use crate::support::random::Random;
 use crate::support::recorder::{Recorder, Recording};
 use crate::support::socket::path_of;
 use crate::support::trio::start_daemon;
-use crate::support::turns;
 use crate::support::witness::Witness;
+use hexad_support::certificate::Certificate;
+use hexad_support::not_run::lacking;
 
 /// Trials in each situation, and the number of situations.
 const TRIALS: u64 = STATES.len() as u64;
@@ -79,8 +78,9 @@ const MEMBER: &[&str] =
 const STATES: [State; 7] = State::ALL;
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn certificate_no_force_is_valid_two_periods_after_an_emergency_stop() {
-    let _turn = turns::alone();
     let Some(witness) = Witness::start() else { return lacking("the right to real-time priority") };
     let certificate = Certificate::new("emergency stops", SITUATIONS * TRIALS, SITUATIONS * LONG_TRIALS);
     let (seed, trials) = (certificate.seed(), certificate.total() / SITUATIONS);
@@ -242,9 +242,7 @@ impl Stand {
     }
 
     fn finish(self) {
-        let Controlled { peer: _peer, daemon, plant, machine: _machine } = self.controlled;
-        daemon.stops_on("TERM", HANG);
-        plant.stops_on("TERM", HANG);
+        self.controlled.finish();
     }
 }
 

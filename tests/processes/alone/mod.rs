@@ -7,6 +7,7 @@ mod doctor;
 mod drive_delay;
 mod estop_trials;
 mod external;
+mod guide;
 mod hybrid;
 mod simulated_time;
 mod system_calls;

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use crate::lockstep::Build;
 use crate::support::machine::PERIOD_NS;
-use crate::support::turns;
 
 /// Time of processors that this process and its children that have ended have used. How long they wait for a processor
 /// depends on who else wants it.
@@ -18,8 +17,9 @@ fn processor_time() -> Duration {
 }
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn simulated_time_is_faster_than_real_time() {
-    let _turn = turns::alone();
     let before = processor_time();
     let simulated = Duration::from_nanos(PERIOD_NS * Build::this(None).forces_for_us().len() as u64);
     let took = processor_time() - before;

@@ -13,11 +13,10 @@ use std::time::Duration;
 
 use hexad::daemon::report::Report;
 
-use crate::common::not_run::lacking;
-use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::children::{Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS};
 use crate::support::peer::Controlled;
-use crate::support::turns;
+use hexad_support::not_run::lacking;
 
 const STRACE: [&str; 5] = ["-D", "-f", "-q", "--seccomp-bpf", "-e"];
 const ALL_BUT_SLEEPS: &str = "trace=!clock_nanosleep";
@@ -27,13 +26,14 @@ const ALL: &str = "trace=all";
 const LEAST_CYCLES: u64 = 1000;
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+// What is traced waits for the tracer, which has no priority.
+#[apply(alone)]
 fn the_loop_calls_the_system_for_its_sleep_only() {
     if let Err(error) = Command::new("strace").arg("--version").output() {
         lacking(&format!("strace: {error}; apt-get install strace"));
         return;
     }
-    // What is traced waits for the tracer, which has no priority.
-    let _turn = turns::alone();
     watch([("sleep", ALL_BUT_SLEEPS), ("hybrid", ALL_BUT_SLEEPS), ("external", ALL_BUT_SLEEPS)]);
     watch([("sleep", ALL)]);
 }
@@ -46,10 +46,7 @@ fn watch<const N: usize>(daemons: [(&str, &str); N]) {
         watched.iter_mut().for_each(|(.., controlled)| controlled.replace_peer());
     }
     for (release, calls, controlled) in watched {
-        let Controlled { peer: _peer, daemon, plant, machine } = controlled;
-        daemon.stops_on("TERM", HANG);
-        plant.stops_on("TERM", HANG);
-        judge(release, calls, &machine);
+        judge(release, calls, &controlled.finish().1);
     }
 }
 

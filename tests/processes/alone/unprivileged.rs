@@ -7,15 +7,15 @@ use crate::support::machine::Machine;
 use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, OWN_PLACES, cannot, wrapped};
 use crate::support::recorder::Recorder;
 use crate::support::trio::start_plant;
-use crate::support::turns;
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn nobody_is_told_what_is_lacking_and_served() {
     let nobody = [OWN_PLACES, NO_LIMITS_RAISED, AS_NOBODY];
     if cannot(&nobody) {
         return;
     }
-    let _turn = turns::alone();
     let Ended { status, stdout, stderr } = demo(&machine("nobody"), &nobody);
     assert_eq!(status.code(), Some(0), "{stdout}\n{stderr}");
     for words in ["no FIFO priority 80: ", "no locked memory: ", "no bound on idle states: "] {
@@ -26,12 +26,13 @@ fn nobody_is_told_what_is_lacking_and_served() {
 }
 
 #[test]
+#[ignore = "second tier: measures, so it runs alone"]
+#[apply(alone)]
 fn nobody_is_served_beside_root() {
     let nobody = [NO_LIMITS_RAISED, AS_NOBODY];
     if cannot(&nobody) {
         return;
     }
-    let _turn = turns::alone();
     let machine = machine("beside");
     let recorder = Recorder::start(&machine.name);
     let plant = start_plant(&machine);
@@ -43,7 +44,7 @@ fn nobody_is_served_beside_root() {
     let page = machine.path("charts").join("report.html");
     assert!(stdout.ends_with(&format!("report           {}\n", page.display())), "{stdout}");
     assert!(!machine.path("charts").join("forces.svg").exists(), "pictures are written on request alone");
-    plant.stops_on("TERM", HANG);
+    plant.stops();
 }
 
 /// With timeouts that also a busy machine does not reach: nobody has priority here.

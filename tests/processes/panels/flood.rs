@@ -4,12 +4,11 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::Panels;
+use super::{Panel, finish, standing};
 use crate::support::disturbance::python;
 use crate::support::operator::does;
-use crate::support::socket::{path_of, status};
+use crate::support::socket::{path_of, state};
 use crate::support::trio::let_pass;
-use crate::support::turns;
 
 /// Lines without pause, valid and not, on twenty connections.
 const FLOOD: &str = r#"
@@ -40,17 +39,17 @@ time.sleep(3600)
 "#;
 
 #[test]
+#[apply(beside_others)]
 fn a_flood_of_motions_disturbs_neither_the_loop_nor_a_stop() {
-    let _turn = turns::beside_others();
-    let panels = Panels::start("panel-flood");
-    panels.client().does("hold", &json!({"engage": true, "wait": true}), "done");
-    let mut flood = python(&["/usr/bin/env"], FLOOD, &[path_of(&panels.daemon).as_os_str()]);
+    let trio = standing("panel-flood", "");
+    Panel::of(&trio).does("hold", &json!({"engage": true, "wait": true}), "done");
+    let mut flood = python(&["/usr/bin/env"], FLOOD, &[path_of(&trio.daemon).as_os_str()]);
     let_pass(Duration::from_secs(2));
-    assert_eq!(status(&panels.machine)["state"], "active");
-    does(&panels.machine, "stop", &[], &["standby"]);
+    assert_eq!(state(&trio.machine), "active");
+    does(&trio.machine, "stop", &[], &["standby"]);
     let_pass(Duration::from_millis(300));
-    assert_eq!(status(&panels.machine)["state"], "standby", "none of them takes control");
+    assert_eq!(state(&trio.machine), "standby", "none of them takes control");
     flood.kill().expect("a signal");
     flood.wait().expect("its end");
-    panels.finish();
+    finish(trio);
 }

@@ -9,32 +9,31 @@ use hexad::messages::CycleMessage;
 use serde_json::Value;
 
 use super::{files, read, start_recording};
-use crate::common::not_run::lacking;
-use crate::common::python::{environment, output};
-use crate::support::children::HANG;
 use crate::support::machine::Machine;
 use crate::support::operator::engage;
 use crate::support::trio::{start_plant, start_setpoints};
-use crate::support::turns;
+use hexad_support::not_run::lacking;
+use hexad_support::python::{environment, output};
 
 /// Packages, with the versions that were tried.
 const PACKAGES: [&str; 2] = ["mcap==1.6.0", "mcap-ros2-support==0.6.0"];
 
 #[test]
+#[ignore = "second tier: needs PyPI"]
+#[apply(beside_others)]
 fn a_recording_opens_in_python() {
     let python = match environment(&PACKAGES.map(String::from)) {
         Ok(folder) => folder.join("bin/python"),
         Err(why) => return lacking(&why),
     };
-    let _turn = turns::beside_others();
     let machine = Machine::patient("recorded-python");
     let plant = start_plant(&machine);
     let daemon = start_recording(&machine);
     let source = start_setpoints(&machine);
     engage(&machine);
     sleep(Duration::from_secs(1));
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
     drop(source);
     let file = &files(&machine, "record")[0];
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients/recording.py");

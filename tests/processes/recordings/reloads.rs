@@ -6,19 +6,17 @@ use hexad::config::Config;
 use hexad::control::signals::state::State;
 
 use super::{about, files, read, replays_exactly, start_recording};
-use crate::support::children::{Ended, HANG};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::{ask, clear, does, engage};
 use crate::support::peer;
 use crate::support::trio::start_plant;
-use crate::support::turns;
 
 const OLD: &str = "position_bandwidth_hz = 10.0";
 const NEW: &str = "position_bandwidth_hz = 7.0";
 
 #[test]
+#[apply(beside_others)]
 fn both_sides_of_a_reload_are_repeated_with_their_own_gains() {
-    let _turn = turns::beside_others();
     let machine = Machine::with("reloads", &format!("{PATIENT}\n[control]\n{OLD}\n"));
     let (plant, _peer) = (start_plant(&machine), peer::start(&machine));
     let daemon = start_recording(&machine);
@@ -28,15 +26,14 @@ fn both_sides_of_a_reload_are_repeated_with_their_own_gains() {
     let old = fs::read_to_string(&machine.file).unwrap();
     let new = old.replace(OLD, NEW);
     fs::write(&machine.file, &new).unwrap();
-    let Ended { status, stdout, stderr } = ask(&machine, "reload", &[]);
-    assert_eq!(status.code(), Some(0), "{stderr}");
+    let stdout = ask(&machine, "reload", &[]).succeeds();
     let (_, cycle) = stdout.split_once(", from cycle ").expect("the first cycle");
     let first: u64 = cycle.split(' ').next().unwrap().parse().unwrap();
     clear(&machine);
     engage(&machine);
     does(&machine, "stop", &[], &["standby"]);
-    daemon.stops_on("TERM", HANG);
-    plant.stops_on("TERM", HANG);
+    daemon.stops();
+    plant.stops();
 
     let recorded = files(&machine, "record");
     let [before, after] = recorded.as_slice() else { panic!("two recordings: {recorded:?}") };
@@ -56,6 +53,6 @@ fn both_sides_of_a_reload_are_repeated_with_their_own_gains() {
     // The gains are in force: with the old ones the cycles would be others.
     fs::write(&machine.file, &old).unwrap();
     let config = machine.file.display().to_string();
-    let Ended { stdout, .. } = about(&machine, "replay", after, &["--config", &config]);
+    let stdout = about(&machine, "replay", after, &["--config", &config]).stdout;
     assert!(stdout.contains(" cycles differ\n"), "{stdout}");
 }

@@ -1,4 +1,4 @@
-//! Recordings of real processes are repeated to the bit, in every mode, with every model, under both policies.
+//! Recordings of real processes are repeated to the bit. `tests/golden` shows it for every mode, fidelity and policy.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,14 +9,11 @@ use std::time::Duration;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::{Request, State};
 
-#[cfg(target_arch = "x86_64")]
-use super::instruction_sets;
 use super::{about, files, read, replays_exactly, start_recording};
 use crate::support::children::{Ended, HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::ask;
 use crate::support::trio::start_plant;
-use crate::support::turns;
 
 /// Time in which something happens in each part of a run; the motion begins a second after control.
 const WHILE: Duration = Duration::from_millis(1800);
@@ -27,13 +24,11 @@ const AFTERWARDS: Duration = Duration::from_millis(1200);
 const MOTION: [&str; 4] = ["--motion", "sines", "--seconds", "6"];
 
 /// Motion, stop, motion, a source that dies, clear, motion, estop, clear.
-fn eventful_run(keys: &str, policy: &str) -> Machine {
-    let sections = format!("{PATIENT}\n[control]\n{keys}\n\n[setpoint]\non_violation = \"{policy}\"\n");
-    let machine = Machine::with("recorded", &sections);
+fn eventful_run() -> Machine {
+    let machine = Machine::with("recorded", &format!("{PATIENT}\n[control]\nfidelity = \"auto\"\n"));
     let plant = start_plant(&machine);
     let daemon = start_recording(&machine);
     daemon.says("running");
-    // Some modes lag so far behind that a request is refused or a fault comes by itself; all of it is recorded.
     for end in ["stop", "", "estop"] {
         let mut source = Hexad::start(&machine, "move", &MOTION);
         let _ = ask(&machine, "engage", &["--wait", "--within", "10"]);
@@ -62,8 +57,6 @@ fn holds(machine: &Machine) {
     }
     let (_, cycles) = read(file);
     let seen: BTreeSet<u32> = cycles.iter().map(|cycle| cycle.state).collect();
-    #[cfg(target_arch = "x86_64")]
-    instruction_sets::all_repeat(file);
     another_system_repeats(machine, file);
     for state in [State::Active, State::Fault] {
         assert!(seen.contains(&(state as u32)), "{state:?} in {seen:?}");
@@ -75,61 +68,11 @@ fn holds(machine: &Machine) {
     }
 }
 
-/// A run with keys of `[control]` and a policy.
-fn is_repeated(keys: &str, policy: &str) {
-    let _turn = turns::beside_others();
-    holds(&eventful_run(keys, policy));
-}
-
 #[test]
-fn rigid_legs_are_repeated() {
-    is_repeated("fidelity = \"rigid-legs\"", "stop");
-}
-
-#[test]
-fn no_velocity_is_repeated() {
-    is_repeated("fidelity = \"no-velocity\"", "limit");
-}
-
-#[test]
-fn lumped_legs_are_repeated() {
-    is_repeated("fidelity = \"lumped-legs\"", "stop");
-}
-
-#[test]
-fn massless_legs_are_repeated() {
-    is_repeated("fidelity = \"massless-legs\"", "limit");
-}
-
-#[test]
-fn the_fidelity_chosen_by_itself_is_repeated() {
-    is_repeated("fidelity = \"auto\"", "stop");
-}
-
-#[test]
-fn feedforward_joint_pd_is_repeated() {
-    is_repeated("mode = \"feedforward_joint_pd\"", "limit");
-}
-
-#[test]
-fn gravity_joint_pd_is_repeated() {
-    is_repeated("mode = \"gravity_joint_pd\"", "stop");
-}
-
-#[test]
-fn joint_pd_is_repeated() {
-    is_repeated("mode = \"joint_pd\"", "limit");
-}
-
-#[test]
-fn computed_torque_is_repeated() {
-    is_repeated("mode = \"computed_torque\"", "limit");
-}
-
-#[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
 fn a_recording_is_repeated_cut_converted_and_compared() {
-    let _turn = turns::beside_others();
-    let machine = eventful_run("", "stop");
+    let machine = eventful_run();
     holds(&machine);
     let file = &files(&machine, "record")[0];
     would_be_different_with_another_configuration(&machine, file);

@@ -33,6 +33,22 @@ pub struct Ended {
     pub stderr: String,
 }
 
+impl Ended {
+    /// It must have succeeded; its standard output.
+    pub fn succeeds(self) -> String {
+        assert_eq!(self.status.code(), Some(0), "{}{}", self.stdout, self.stderr);
+        self.stdout
+    }
+
+    /// It must have failed with this code, and these words on standard error, which is returned.
+    pub fn fails(self, code: i32, words: &str) -> String {
+        let Self { status, stdout, stderr } = self;
+        assert_eq!(status.code(), Some(code), "{stdout}{stderr}");
+        assert!(stderr.contains(words), "{words:?} must be in {stderr}");
+        stderr
+    }
+}
+
 /// The command, for those who start it in a special way. It stops when the tests are killed.
 pub fn hexad() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
@@ -66,22 +82,15 @@ impl Hexad {
         self.child.id()
     }
 
-    /// Sends a signal by name. By the shell: tests hold no unsafe code.
     pub fn signal(&self, name: &str) {
-        let line = format!("kill -s {name} {}", self.child.id());
-        let status = Command::new("sh").args(["-c", &line]).status().expect("a shell");
-        assert!(status.success(), "{line}: {status}");
+        signal(self.child.id(), name);
     }
 
     /// SIGSTOP, and all its threads stand. One of them has to run to begin with that: on a busy machine this
     /// takes a while.
     pub fn hold(&self) {
         self.signal("STOP");
-        let start = Instant::now();
-        while !all_stopped(self.id()) {
-            assert!(start.elapsed() < HANG, "{} does not stop", self.command);
-            sleep(LOOK);
-        }
+        self.waits(|| all_stopped(self.id()), "stop");
     }
 
     /// SIGKILL, and it is gone.
@@ -103,20 +112,27 @@ impl Hexad {
 
     /// Waits until it has said this.
     pub fn says(&self, words: &str) {
-        let start = Instant::now();
-        while !self.words().contains(words) {
-            let command = &self.command;
-            assert!(start.elapsed() < HANG, "{command} must say {words:?}, and said:\n{}", self.words());
-            sleep(LOOK);
-        }
+        self.waits(|| self.words().contains(words), &format!("say {words:?}"));
     }
 
     /// Waits until it has said this, or has ended.
     pub fn says_or_has_ended(&mut self, words: &str) {
         let start = Instant::now();
         while !self.words().contains(words) && self.runs() {
-            let command = &self.command;
-            assert!(start.elapsed() < HANG, "{command} must say {words:?}, and said:\n{}", self.words());
+            assert!(
+                start.elapsed() < HANG,
+                "{} must say {words:?}, and said:\n{}",
+                self.command,
+                self.words()
+            );
+            sleep(LOOK);
+        }
+    }
+
+    fn waits(&self, is_so: impl Fn() -> bool, what: &str) {
+        let start = Instant::now();
+        while !is_so() {
+            assert!(start.elapsed() < HANG, "{} must {what}, and said:\n{}", self.command, self.words());
             sleep(LOOK);
         }
     }
@@ -139,16 +155,15 @@ impl Hexad {
             if let Some(status) = self.child.try_wait().expect("the state of a process") {
                 break status;
             }
-            let command = &self.command;
-            assert!(
-                start.elapsed() < limit,
-                "{command} must end within {limit:?}, and said:\n{}",
-                self.words()
-            );
+            assert!(start.elapsed() < limit, "{} does not end:\n{}", self.command, self.words());
             sleep(LOOK);
         };
-        let stdout = fs::read_to_string(&self.stdout).expect("standard output");
-        Ended { status, stdout, stderr: self.words() }
+        Ended { status, stdout: self.printed(), stderr: self.words() }
+    }
+
+    /// Waits for its end.
+    pub fn ends(self) -> Ended {
+        self.ends_within(HANG)
     }
 
     /// Sends a signal; it must end in order.
@@ -160,15 +175,23 @@ impl Hexad {
         ended
     }
 
-    /// Sends a signal to what is at work: it must end in order, and say that it was interrupted.
-    pub fn interrupted_on(self, signal: &str, limit: Duration) -> Ended {
-        self.signal(signal);
-        let command = self.command.clone();
-        let ended = self.ends_within(limit);
-        assert_eq!(ended.status.code(), Some(130), "{command} after SIG{signal}:\n{}", ended.stderr);
-        assert!(ended.stderr.contains("hexad: interrupted"), "{}", ended.stderr);
-        ended
+    /// It must end in order on SIGTERM; all of its standard error.
+    pub fn stops(self) -> String {
+        self.stops_on("TERM", HANG).stderr
     }
+
+    /// Sends a signal to what is at work: it must end in order, and say that it was interrupted. Returns its standard error.
+    pub fn interrupted_on(self, signal: &str) -> String {
+        self.signal(signal);
+        self.ends().fails(130, "hexad: interrupted")
+    }
+}
+
+/// Sends a signal by name. By the shell, which every system has: tests hold no unsafe code.
+pub fn signal(process: u32, name: &str) {
+    let line = format!("kill -s {name} {process}");
+    let status = Command::new("sh").args(["-c", &line]).status().expect("a shell");
+    assert!(status.success(), "{line}: {status}");
 }
 
 impl Drop for Hexad {
@@ -186,5 +209,5 @@ impl Drop for Hexad {
 pub fn run<S: AsRef<OsStr>>(machine: &Machine, arguments: &[S]) -> Ended {
     let mut command = hexad();
     command.args(arguments);
-    Hexad::spawn(machine, "hexad", command).ends_within(HANG)
+    Hexad::spawn(machine, "hexad", command).ends()
 }

@@ -5,54 +5,38 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{JoinHandle, spawn};
+use std::sync::atomic::Ordering;
 
 use hexad::control::signals::state::Request;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, CommandMessage};
 
+use super::background::Background;
 use crate::always_stops::{Hostile, Slots};
 
 /// A user outside of the group.
 const OUTSIDER: &[&str] = &["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"];
 
-/// 64 that connect again and again; the number of those that succeeded.
-const PYTHON_OUTSIDERS: &str = r#"
-import socket, sys, threading, time
-entered = 0
-def knock():
-    global entered
-    while True:
-        try:
-            socket.socket(socket.AF_UNIX).connect(sys.argv[1])
-            entered += 1
-            print("entered", flush=True)
-        except OSError:
-            time.sleep(0.0001)
-for _ in range(64):
-    threading.Thread(target=knock, daemon=True).start()
-print("here", flush=True)
-time.sleep(3600)
-"#;
-
-/// 16 that send lines with more files than the daemon receives.
-const PYTHON_FILES: &str = r#"
+/// So many threads do something with a new connection without pause; it prints what it must not do.
+const PYTHON: &str = r#"
 import array, socket, sys, threading, time
 line = b'{"version": 1, "request": "status"}\n'
 files = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [0] * 60))]
-def send():
+def outsider(link):
+    print("entered", flush=True)
+def pass_files(link):
+    link.sendmsg([line], files)
+    link.recv(65536)
+def act():
     while True:
         try:
             link = socket.socket(socket.AF_UNIX)
             link.connect(sys.argv[1])
-            link.sendmsg([line], files)
-            link.recv(65536)
+            globals()[sys.argv[2]](link)
         except OSError:
             time.sleep(0.0001)
-for _ in range(16):
-    threading.Thread(target=send, daemon=True).start()
+for _ in range(int(sys.argv[3])):
+    threading.Thread(target=act, daemon=True).start()
 print("here", flush=True)
 time.sleep(3600)
 "#;
@@ -86,7 +70,7 @@ pub enum Disturbance {
     Slots {
         _slots: Box<Slots>,
     },
-    Messages(Vec<Flood>),
+    Messages(Background<u64>),
     Connections(Hostile),
     /// A process that says no word unless it gets what it must not.
     Process(Child, BufReader<std::process::ChildStdout>),
@@ -98,18 +82,18 @@ impl Disturbance {
         match situation {
             Situation::Quiet | Situation::Member | Situation::Together => Self::None,
             Situation::Slots => Self::Slots { _slots: Box::new(Slots::fill(machine)) },
-            Situation::Messages => Self::Messages((0..4).map(|_| Flood::start(machine)).collect()),
+            Situation::Messages => Self::Messages(flood(machine)),
             Situation::Connections => Self::Connections(Hostile::start(socket, 64)),
-            Situation::Outsiders => Self::process(OUTSIDER, PYTHON_OUTSIDERS, socket),
-            Situation::Files => Self::process(&["/usr/bin/env"], PYTHON_FILES, socket),
+            Situation::Outsiders => Self::process(OUTSIDER, socket, "outsider", "64"),
+            Situation::Files => Self::process(&["/usr/bin/env"], socket, "pass_files", "16"),
             Situation::Full => {
                 Self::Full(["/dev/shm", "/tmp"].map(|folder| filled(Path::new(folder))).into())
             }
         }
     }
 
-    fn process(user: &[&str], program: &str, socket: &Path) -> Self {
-        let mut child = python(user, program, &[socket.as_os_str()]);
+    fn process(user: &[&str], socket: &Path, act: &str, count: &str) -> Self {
+        let mut child = python(user, PYTHON, &[socket.as_os_str(), act.as_ref(), count.as_ref()]);
         let mut words = BufReader::new(child.stdout.take().expect("a pipe"));
         assert_eq!(line_of(&mut words), "here");
         Self::Process(child, words)
@@ -118,7 +102,10 @@ impl Disturbance {
     pub fn end(self) {
         match self {
             Self::None | Self::Slots { .. } => {}
-            Self::Messages(floods) => floods.into_iter().for_each(Flood::finish),
+            Self::Messages(flood) => {
+                let sent = flood.finish();
+                assert!(sent.iter().all(|sent| *sent > 1000), "{sent:?} requests");
+            }
             Self::Connections(hostile) => println!("the connections sent {} bytes", hostile.finish()),
             Self::Process(mut child, mut words) => {
                 child.kill().expect("a signal");
@@ -157,41 +144,17 @@ fn filled(folder: &Path) -> PathBuf {
     path
 }
 
-/// Requests without pause on the topic.
-pub struct Flood {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<u64>>,
-}
-
-impl Flood {
-    fn start(machine: &str) -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        let thread = {
-            let (stop, machine) = (stop.clone(), machine.to_owned());
-            spawn(move || {
-                let bus = Bus::join(&machine).expect("to join");
-                let mut commands = bus.publisher::<CommandMessage>().expect("to publish");
-                let mut sent = 0;
-                while !stop.load(Ordering::Relaxed) {
-                    // So it is under control again as soon as the fault is cleared, and not before.
-                    sent += u64::from(commands.publish(monotonic_ns(), Request::Engage.into()).is_ok());
-                }
-                sent
-            })
-        };
-        Self { stop, thread: Some(thread) }
-    }
-
-    fn finish(mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        let sent = self.thread.take().expect("taken only here").join().expect("a publisher");
-        assert!(sent > 1000, "{sent} requests");
-    }
-}
-
-/// Also when a test has failed: the others need the processors.
-impl Drop for Flood {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
+/// Requests without pause on the topic; the number of those that were sent.
+fn flood(machine: &str) -> Background<u64> {
+    let machine = machine.to_owned();
+    Background::start(4, move |_, stop| {
+        let bus = Bus::join(&machine).expect("to join");
+        let mut commands = bus.publisher::<CommandMessage>().expect("to publish");
+        let mut sent = 0;
+        while !stop.load(Ordering::Relaxed) {
+            // So it is under control again as soon as the fault is cleared, and not before.
+            sent += u64::from(commands.publish(monotonic_ns(), Request::Engage.into()).is_ok());
+        }
+        sent
+    })
 }

@@ -2,14 +2,13 @@
 
 use std::fs;
 use std::io::BufReader;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use super::children::{Ended, HANG, Hexad, hexad};
+use super::children::{Ended, Hexad};
 use super::disturbance::line_of;
 use super::machine::Machine;
-use super::nobody::cannot;
+use super::nobody::{cannot, program_for_others};
 
 /// Users without a name.
 pub const MALLORY: u32 = 64_010;
@@ -22,9 +21,10 @@ pub const NOGROUP: u32 = 65_534;
 /// The folder of the machine, there.
 const PLACE: &str = "/run/test";
 
-const MAKE: &str = "mount -t tmpfs -o mode=755 tmpfs /run && mkdir /run/test && mount --bind \"$0\" /run/test && \
-     mount -t tmpfs -o mode=1777 tmpfs /tmp && mount -t tmpfs -o mode=1777 tmpfs /dev/shm && echo ready && \
-     exec sleep infinity";
+/// Arguments: the folder of the machine, and that of the build's files, which stays where it is also if it is below `/run` or `/tmp`.
+const MAKE: &str = "cd \"$1\" && mount -t tmpfs -o mode=755 tmpfs /run && mkdir /run/test && mount --bind \"$0\" /run/test && \
+     mount -t tmpfs -o mode=1777 tmpfs /tmp && mount -t tmpfs -o mode=1777 tmpfs /dev/shm && mkdir -p \"$1\" && \
+     mount --no-canonicalize --bind . \"$1\" && echo ready && exec sleep infinity";
 
 /// It lasts until this is dropped and all its processes have ended.
 pub struct Host {
@@ -38,10 +38,10 @@ impl Host {
         if cannot(&[&["unshare", "--mount"], &["setpriv", "--reuid", "64010", "--clear-groups"]]) {
             return None;
         }
-        fs::copy(hexad().get_program(), machine.path("hexad")).expect("a copy of the binary");
-        fs::set_permissions(machine.folder(), fs::Permissions::from_mode(0o777)).expect("an open folder");
+        program_for_others(&machine);
         let mut command = Command::new("unshare");
-        command.args(["--mount", "sh", "-c", MAKE]).arg(machine.folder()).stdout(Stdio::piped());
+        command.args(["--mount", "sh", "-c", MAKE]).arg(machine.folder()).arg(env!("CARGO_TARGET_TMPDIR"));
+        command.stdout(Stdio::piped());
         let mut holder = command.spawn().expect("a host");
         let said = line_of(&mut BufReader::new(holder.stdout.take().expect("a pipe")));
         assert_eq!(said, "ready");
@@ -84,7 +84,7 @@ impl Host {
 
     /// The same to its end.
     pub fn run(&self, user: u32, groups: &[u32], arguments: &[&str]) -> Ended {
-        self.spawn("hexad", self.hexad(user, groups, arguments)).ends_within(HANG)
+        self.spawn("hexad", self.hexad(user, groups, arguments)).ends()
     }
 
     /// Starts a process.

@@ -1,10 +1,13 @@
 //! A machine file of a test's own, under a name nobody else has.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::{fs, process};
 
 use tempfile::TempDir;
+
+use super::children::{Ended, Hexad};
 
 const FRIED: &str = include_str!("../../../config/fried2008.toml");
 
@@ -58,6 +61,11 @@ impl Machine {
     /// The machine of the paper with [`PATIENT`].
     pub fn patient(test: &str) -> Self {
         Self::with(test, PATIENT)
+    }
+
+    /// `hexad COMMAND --config <this file> <more>` to its end.
+    pub fn hexad<S: AsRef<OsStr>>(&self, command: &str, more: &[S]) -> Ended {
+        Hexad::start(self, command, more).ends()
     }
 
     /// A file beside the machine file.

@@ -1,5 +1,6 @@
 //! What the tests share.
 
+pub mod background;
 pub mod button;
 pub mod children;
 pub mod disturbance;
@@ -16,6 +17,7 @@ pub mod socket;
 pub mod steps;
 pub mod threads;
 pub mod trio;
+#[macro_use]
 pub mod turns;
 pub mod witness;
 pub mod xml;

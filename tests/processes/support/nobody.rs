@@ -7,7 +7,7 @@ use std::process::Command;
 
 use super::children::hexad;
 use super::machine::Machine;
-use crate::common::not_run::lacking;
+use hexad_support::not_run::lacking;
 
 /// `nobody` on every Linux.
 const NOBODY: &str = "65534";
@@ -32,13 +32,20 @@ pub const AS_NOBODY: &[&str] = &["setpriv", "--reuid", NOBODY, "--regid", NOBODY
 
 /// The command `hexad`, behind these wrappers one after the other.
 pub fn wrapped(machine: &Machine, wrappers: &[&[&str]]) -> Command {
-    // The folders on the way to the binary and to the machine file may be closed to others.
-    let program = machine.path("hexad");
-    fs::copy(hexad().get_program(), &program).expect("a copy of the binary");
-    fs::set_permissions(machine.folder(), Permissions::from_mode(0o777)).expect("an open folder");
-    let mut command = behind(wrappers, program);
+    let mut command = behind(wrappers, program_for_others(machine));
     command.env("TMPDIR", machine.folder()).env_remove("HEXAD_LOG");
     command
+}
+
+/// A copy of the program in the machine's folder, which is open to all: the folders on the way to the build's may be closed to others.
+pub fn program_for_others(machine: &Machine) -> PathBuf {
+    let program = machine.path("hexad");
+    // By a process of its own: a child that another test starts would inherit the file open for writing, and until its own program
+    // runs, "Text file busy" would be the answer to whoever starts this one.
+    let copied = Command::new("cp").arg(hexad().get_program()).arg(&program).status().expect("cp");
+    assert!(copied.success(), "a copy of the binary");
+    fs::set_permissions(machine.folder(), Permissions::from_mode(0o777)).expect("an open folder");
+    program
 }
 
 /// Whether these wrappers do not work here; the calling test is then not run.

@@ -1,30 +1,36 @@
 //! An operator at the command line.
 
-use super::children::{Ended, run};
+use hexad::messages::location::user_id;
+use hexad::operator::users::user_name;
+
+use super::children::Ended;
 use super::machine::Machine;
 
 /// Less than the tests wait for any process.
 const WITHIN_S: &str = "45";
 
+/// Name of the user of the tests, as the log and the status show it.
+pub fn own_name() -> String {
+    user_name(user_id())
+}
+
 /// `hexad REQUEST` with more arguments, to its end.
 pub fn ask(machine: &Machine, request: &str, more: &[&str]) -> Ended {
-    let file = machine.file.display().to_string();
     let within: &[&str] = if more.contains(&"--within") { &[] } else { &["--within", WITHIN_S] };
-    run(machine, &[&[request, "--config", &file], within, more].concat())
+    machine.hexad(request, &[within, more].concat())
 }
 
 /// A request that must be carried out and lead to one of these states.
 pub fn does(machine: &Machine, request: &str, more: &[&str], states: &[&str]) {
-    let Ended { status, stdout, stderr } = ask(machine, request, more);
-    assert_eq!(status.code(), Some(0), "{request}: {stderr}");
-    assert!(states.contains(&stdout.trim_end()), "{request} led to {stdout}");
+    let state = ask(machine, request, more).succeeds();
+    assert!(states.contains(&state.trim_end()), "{request} led to {state}");
 }
 
 /// A request that must not be carried out, and the words why.
 pub fn is_refused(machine: &Machine, request: &str, more: &[&str], words: &str) {
-    let Ended { status, stdout, stderr } = ask(machine, request, more);
-    assert_eq!((status.code(), stdout.as_str()), (Some(1), ""), "{request}: {stderr}");
-    assert!(stderr.contains(words), "{request}: {words:?} must be in {stderr}");
+    let ended = ask(machine, request, more);
+    assert_eq!(ended.stdout, "", "{request}");
+    ended.fails(1, words);
 }
 
 /// Takes control as soon as everything is there.

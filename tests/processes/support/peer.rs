@@ -57,6 +57,13 @@ impl Controlled {
         Self { peer, daemon, plant, machine }
     }
 
+    /// Ends daemon and plant in order; all that the daemon has said, and the machine with its files.
+    pub fn finish(self) -> (String, Machine) {
+        let said = self.daemon.stops();
+        self.plant.stops();
+        (said, self.machine)
+    }
+
     /// The present peer is killed; another one follows it within the timeout, however long a process takes to start.
     pub fn replace_peer(&mut self) {
         let next = Waiting::start(&self.machine);

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, mpsc};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
+use hexad::control::signals::state::State;
 use hexad::daemon::cycle::WORD_EPOCH;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, PortError, RejectionCounts, Subscriber};
@@ -16,6 +17,7 @@ use hexad::realtime::request_word;
 use hexad::realtime::setup::scheduling;
 
 use super::children::HANG;
+use super::trio::fastest;
 
 /// The topics hold 256 ms at 1 kHz.
 const POLL: Duration = Duration::from_millis(1);
@@ -38,6 +40,17 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// The platform must have stood between two instants, under control or not.
+    pub fn stands(&self, (from_ns, to_ns): (u64, u64)) {
+        let during = self.measured.iter().filter(|it| (from_ns..to_ns).contains(&it.header.time_ns));
+        let speed = during.map(fastest).fold(0.0, f64::max);
+        assert!(speed < 1e-3, "a leg moves at {speed} m/s while the platform is to stand");
+    }
+
+    pub fn has_no_fault(&self) {
+        assert!(self.forces.iter().all(|force| force.state != State::Fault as u32), "no fault");
+    }
+
     /// Longest silence that ended within this time, of daemon, plant or setpoint source \[ns\].
     pub fn longest_silence_ns(&self, within_ns: impl RangeBounds<u64>) -> u64 {
         let times: [Vec<u64>; 3] = [

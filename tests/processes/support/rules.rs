@@ -6,6 +6,7 @@ use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::SetpointKind;
 use hexad::control::signals::state::{Request, State};
 use hexad::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage};
+use hexad_support::not_run::not_run;
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
 use super::recorder::Recording;
@@ -43,20 +44,27 @@ pub fn ends_at_rest(recording: &Recording) {
     let last = recording.forces.last().expect("forces");
     assert_eq!((last.valid, last.diagnostic_code), (0, DiagnosticCode::DaemonEnding as u32), "{last:#?}");
     let valid = recording.forces.iter().rfind(|force| force.valid == 1).expect("a valid force");
+    let next = recording.forces.iter().find(|force| force.header.time_ns > valid.header.time_ns);
+    let next = next.expect("the last one is not valid");
+    // The stop of a platform at rest takes a few cycles: a paused recorder has lost them.
+    if next.header.sequence > valid.header.sequence + 1 {
+        return not_run("the host pauses the recorder: forces at the end of control are lost");
+    }
     assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
     let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
     let measured = recording.measured.iter().rfind(until_then).expect("a measurement");
+    if measured.header.time_ns + 10 * PERIOD_NS < valid.header.time_ns {
+        return not_run("the host pauses the recorder: measurements at the end of control are lost");
+    }
     // If a process was held during the stop, the platform continued under the last force.
     let before = recording
         .forces
         .iter()
         .rfind(|force| force.state != valid.state && force.header.time_ns < valid.header.time_ns);
-    let next = recording.forces.iter().find(|force| force.header.time_ns > valid.header.time_ns);
-    let stop_ns = before.expect("the stop began").header.time_ns
-        ..=next.expect("the last one is not valid").header.time_ns;
+    let stop_ns = before.expect("the stop began").header.time_ns..=next.header.time_ns;
     let held_ns = recording.longest_silence_ns(stop_ns).saturating_sub(3 * PERIOD_NS);
     let slowest = AT_REST + DECELERATION * (held_ns as f64 * 1e-9);
-    assert!(fastest(measured) < slowest, "under the last valid force, held {held_ns} ns: {measured:#?}");
+    assert!(fastest(measured) < slowest, "under {valid:#?}, held {held_ns} ns: {measured:#?}");
 }
 
 /// A driver can check each by itself, and within a life everything goes forward.

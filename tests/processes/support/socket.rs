@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::children::{Ended, HANG, Hexad};
 use super::machine::Machine;
@@ -38,6 +38,19 @@ impl Client {
         self.stream.write_all(text.as_bytes()).expect("to send");
     }
 
+    /// Sends a request with these fields.
+    pub fn request(&mut self, name: &str, more: &Value) {
+        let mut line = json!({"version": 1, "request": name});
+        more.as_object().expect("keys").iter().for_each(|(key, value)| line[key] = value.clone());
+        self.send(&format!("{line}\n"));
+    }
+
+    /// The answer to a request.
+    pub fn ask(&mut self, name: &str, more: &Value) -> Value {
+        self.request(name, more);
+        self.answer()
+    }
+
     /// The next line.
     pub fn answer(&mut self) -> Value {
         let mut line = String::new();
@@ -54,11 +67,18 @@ impl Client {
 
 /// The answer of `hexad status --json`.
 pub fn status(machine: &Machine) -> Value {
-    let file = machine.file.display().to_string();
-    let Ended { status, stdout, stderr } =
-        super::children::run(machine, &["status", "--json", "--config", &file]);
-    assert_eq!(status.code(), Some(0), "{stderr}");
-    serde_json::from_str(&stdout).expect("JSON")
+    serde_json::from_str(&machine.hexad("status", &["--json"]).succeeds()).expect("JSON")
+}
+
+/// State of the daemon, by its status.
+pub fn state(machine: &Machine) -> String {
+    status(machine)["state"].as_str().expect("a state").into()
+}
+
+/// X of the platform, by the status.
+pub fn pose(machine: &Machine) -> [f64; 6] {
+    let pose = status(machine)["status"]["pose"].clone();
+    core::array::from_fn(|k| pose[k].as_f64().unwrap_or(f64::NAN))
 }
 
 /// A request that stops, however it is confirmed; true if by the socket.

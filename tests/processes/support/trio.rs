@@ -1,12 +1,13 @@
-//! Plant, daemon and setpoint source of one machine, in motion, and somebody who listens.
+//! Plant, daemon and setpoint source of one machine, and somebody who listens.
 
 use std::time::Duration;
 
 use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 
-use super::children::{Ended, HANG, Hexad};
+use super::children::Hexad;
 use super::machine::Machine;
 use super::recorder::{Recorder, Recording};
 use super::{operator, rules};
@@ -14,12 +15,12 @@ use super::{operator, rules};
 /// A leg faster than this is in motion \[m/s\]. The fastest legs of the motion exceed it several times over.
 const IN_MOTION: f64 = 0.1;
 
-/// Longer than any test; the setpoint source is stopped when the test is done.
-const MOTION: [&str; 4] = ["--motion", "sines", "--seconds", "100"];
+/// Longer than any test but one; the setpoint source is stopped when the test is done. A player checks all of its motion before it begins.
+const MOTION_S: &str = "40";
 
 /// Fields are dropped in this order: the processes before the one that listens, the files last.
 pub struct Trio {
-    pub setpoints: Hexad,
+    pub setpoints: Option<Hexad>,
     pub daemon: Hexad,
     pub plant: Hexad,
     pub recorder: Recorder,
@@ -27,17 +28,30 @@ pub struct Trio {
 }
 
 impl Trio {
+    /// Without a setpoint source: the platform stands without force.
+    pub fn standing(machine: Machine) -> Self {
+        let recorder = Recorder::start(&machine.name);
+        let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+        daemon.says("standby: no setpoint");
+        Self { setpoints: None, daemon, plant, recorder, machine }
+    }
+
     /// Starts all three, engages and waits until the platform is in full motion.
     pub fn in_motion(test: &str) -> Self {
-        let machine = Machine::patient(test);
-        let recorder = Recorder::start(&machine.name);
-        let plant = start_plant(&machine);
-        let daemon = start_daemon(&machine);
-        let setpoints = start_setpoints(&machine);
-        operator::engage(&machine);
-        let trio = Self { setpoints, daemon, plant, recorder, machine };
+        Self::in_motion_of(test, start_setpoints)
+    }
+
+    /// With the setpoints of another source.
+    pub fn in_motion_of(test: &str, start_setpoints: fn(&Machine) -> Hexad) -> Self {
+        let mut trio = Self::standing(Machine::patient(test));
+        trio.setpoints = Some(start_setpoints(&trio.machine));
+        operator::engage(&trio.machine);
         trio.moves_after(0);
         trio
+    }
+
+    pub fn setpoints(&mut self) -> &mut Hexad {
+        self.setpoints.as_mut().expect("a setpoint source")
     }
 
     /// Waits until the platform moves under forces computed after an instant.
@@ -50,20 +64,24 @@ impl Trio {
         });
     }
 
+    /// Waits until the daemon is in a state.
+    pub fn is_in(&self, state: State) {
+        self.recorder.until(state.name(), |recording| {
+            recording.statuses.last().filter(|status| status.state == state as u32).map(drop)
+        });
+    }
+
     /// An operator has ended control, and with it the player, which says so. Another one begins.
     pub fn replay(&mut self) {
-        let ended = std::mem::replace(&mut self.setpoints, start_setpoints(&self.machine));
-        player_ended(ended);
+        self.setpoints.take().into_iter().for_each(player_ended);
+        self.setpoints = Some(start_setpoints(&self.machine));
     }
 
     /// Waits until no force is valid any more, for this reason.
     pub fn loses_force_for(&self, cause: DiagnosticCode) {
         self.recorder.until("the daemon marks its forces as not valid", |recording| {
-            recording
-                .forces
-                .last()
-                .filter(|force| force.valid == 0 && force.diagnostic_code == cause as u32)
-                .copied()
+            let force = recording.forces.last()?;
+            (force.valid == 0 && force.diagnostic_code == cause as u32).then_some(())
         });
     }
 
@@ -78,26 +96,25 @@ impl Trio {
         });
     }
 
-    /// Ends everything in order; the recording has passed the rules.
+    /// Ends everything in order; the recording has passed the rules. A platform in motion comes to rest under control.
     pub fn finish(mut self) -> Recording {
-        for process in [&mut self.setpoints, &mut self.daemon, &mut self.plant] {
-            process.must_run();
-        }
-        self.daemon.stops_on("TERM", HANG);
-        player_ended(self.setpoints);
-        self.plant.stops_on("TERM", HANG);
+        let in_motion = self.setpoints.is_some();
+        self.setpoints.iter_mut().chain([&mut self.daemon, &mut self.plant]).for_each(Hexad::must_run);
+        self.daemon.stops();
+        self.setpoints.into_iter().for_each(player_ended);
+        self.plant.stops();
         let recording = self.recorder.finish();
         rules::hold(&recording);
-        rules::ends_at_rest(&recording);
+        if in_motion {
+            rules::ends_at_rest(&recording);
+        }
         recording
     }
 }
 
 /// A player whose control an operator has ended, or the end of the daemon, which is a stop.
 pub fn player_ended(player: Hexad) {
-    let Ended { status, stderr, .. } = player.ends_within(HANG);
-    let words = "hexad: the motion has ended: the daemon is in ";
-    assert!(status.code() == Some(1) && stderr.contains(words), "{status}: {stderr}");
+    player.ends().fails(1, "hexad: the motion has ended: the daemon is in ");
 }
 
 /// Returns when it has joined, or has ended: a participant that begins meanwhile waits for its topics, but not for long.
@@ -117,7 +134,7 @@ pub fn start_daemon(machine: &Machine) -> Hexad {
 }
 
 pub fn start_setpoints(machine: &Machine) -> Hexad {
-    Hexad::start(machine, "move", &MOTION)
+    Hexad::start(machine, "move", &["--motion", "sines", "--seconds", MOTION_S])
 }
 
 /// Whether a force is valid and was computed after an instant.

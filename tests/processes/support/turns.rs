@@ -1,33 +1,78 @@
-//! Tests that measure run alone: locks on files, so that it also holds between test processes.
+//! Tests that measure run alone, and those of two clones on one host one after the other: they use the same processors, ports and
+//! names. What fails while the host has taken a processor away is done once more: motions in true time need all of them. A fault of
+//! ours shows again without the host.
 
 use std::fs::File;
-use std::path::Path;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{OnceLock, PoisonError, RwLock};
+use std::time::Duration;
 
-/// Held for the duration of a test.
-pub struct Turn(#[allow(dead_code, reason = "the lock lives as long as the file is open")] File);
+use hexad_support::stalls::Watchdog;
 
-fn file(name: &str) -> File {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("hexad-processes{name}.lock"));
-    File::create(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+/// Who waits for it to write comes before who reads later.
+static TURN: RwLock<()> = RwLock::new(());
+
+/// Taken with the first turn of this process, and held until it ends.
+static HOST: OnceLock<File> = OnceLock::new();
+
+/// Shorter pauses of the host no test may mind.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// So often a test that the host has disturbed is done.
+const ATTEMPTS: usize = 4;
+
+fn wait_for_other_processes() {
+    HOST.get_or_init(|| {
+        let path = std::env::temp_dir().join("hexad-processes.lock");
+        // One that another user has made is only to be read.
+        let file = File::open(&path).or_else(|_| File::create(&path));
+        let file = file.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        file.lock().expect("the lock of the tests");
+        file
+    });
 }
 
-/// The door to the other lock: behind a test that waits to run alone all others wait, and not only those that run alone.
-fn door() -> File {
-    let door = file("-door");
-    door.lock().expect("the lock of the tests");
-    door
+/// A test that runs alone.
+macro_rules! alone {
+    ($(#[$meta:meta])* fn $name:ident($($parameter:ident: $kind:ty),*) $body:block) => {
+        $(#[$meta])*
+        fn $name($($parameter: $kind),*) {
+            $crate::support::turns::alone(|| $body);
+        }
+    };
 }
 
-/// Alone.
-pub fn alone() -> Turn {
-    let (_door, file) = (door(), file(""));
-    file.lock().expect("the lock of the tests");
-    Turn(file)
+/// A test that runs beside others that do not measure.
+macro_rules! beside_others {
+    ($(#[$meta:meta])* fn $name:ident($($parameter:ident: $kind:ty),*) $body:block) => {
+        $(#[$meta])*
+        fn $name($($parameter: $kind),*) {
+            $crate::support::turns::beside_others(|| $body);
+        }
+    };
 }
 
-/// Beside others that do not measure.
-pub fn beside_others() -> Turn {
-    let (_door, file) = (door(), file(""));
-    file.lock_shared().expect("the lock of the tests");
-    Turn(file)
+pub fn alone(test: impl Fn()) {
+    wait_for_other_processes();
+    let _turn = TURN.write().unwrap_or_else(PoisonError::into_inner);
+    unless_the_host_pauses(&test);
+}
+
+pub fn beside_others(test: impl Fn()) {
+    wait_for_other_processes();
+    let _turn = TURN.read().unwrap_or_else(PoisonError::into_inner);
+    unless_the_host_pauses(&test);
+}
+
+fn unless_the_host_pauses(test: &dyn Fn()) {
+    for _ in 1..ATTEMPTS {
+        let host = Watchdog::start_ordinary();
+        let Err(failure) = catch_unwind(AssertUnwindSafe(test)) else { return };
+        let pause = host.largest();
+        if pause < PAUSE {
+            resume_unwind(failure);
+        }
+        eprintln!("the host was away for {pause:?}: once more");
+    }
+    test();
 }

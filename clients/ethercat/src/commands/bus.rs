@@ -3,8 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hexad::config::Config;
-use hexad::realtime::stop_request::Stop;
+use hexad_client::realtime::stop_request::Stop;
 use hexad_ethercat::bus::{Bus, Frames};
 use hexad_ethercat::cia402::Goal;
 use hexad_ethercat::drives_file::{DrivesFile, LegSection, SdoWrite};
@@ -14,6 +13,7 @@ use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
 use hexad_ethercat::{
     brake_test, file_edit, inventory, jog as jogging, machine_check, objects, scan as scanning,
 };
+use hexad_machine::config::Config;
 
 use tracing::warn;
 

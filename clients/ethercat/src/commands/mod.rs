@@ -9,10 +9,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Parser, Subcommand};
-use hexad::config::Config;
 use hexad_ethercat::bus::{Bus, Frames};
 use hexad_ethercat::drives_file::DrivesFile;
 use hexad_ethercat::raw_socket::RawSocket;
+use hexad_machine::config::Config;
 
 /// Driver of hexad for CiA 402 drives on EtherCAT. No version of it has run on hardware yet: read docs/ethercat.md first.
 #[derive(Debug, Parser)]

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use hexad::realtime::allocation::calls_of_this_thread;
-use hexad::realtime::setup::{Shortfall, memory, scheduling};
-use hexad::realtime::stop_request::Stop;
+use hexad_client::realtime::allocation::calls_of_this_thread;
+use hexad_client::realtime::setup::{Shortfall, memory, scheduling};
+use hexad_client::realtime::stop_request::Stop;
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::cycle::Driver;
 use hexad_ethercat::machine_check;

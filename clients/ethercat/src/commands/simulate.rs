@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use hexad::realtime::setup::scheduling;
-use hexad::realtime::stop_request::Stop;
+use hexad_client::realtime::setup::scheduling;
+use hexad_client::realtime::stop_request::Stop;
 use hexad_ethercat::link::Link;
+use hexad_ethercat::link::MAX_FRAME;
 use hexad_ethercat::raw_socket::RawSocket;
-use hexad_ethercat::segment::MAX_FRAME;
 use hexad_ethercat::segment::device::Device;
 use hexad_ethercat::simulation;
 use tracing::info;

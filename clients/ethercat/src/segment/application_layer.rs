@@ -3,23 +3,9 @@
 use super::device::Device;
 use super::object_dictionary::MappedObject;
 use super::sii::{MAILBOX_LENGTH, SYNC_MANAGER_STARTS};
+use crate::al_state::{ERROR, INIT, OP, PRE_OP, SAFE_OP};
 use crate::cia402::DriveState;
 use crate::objects;
-
-/// State of the application layer, as in the registers 0x0120 and 0x0130.
-pub mod al_state {
-    /// Registers only.
-    pub const INIT: u8 = 1;
-    /// Mailbox.
-    pub const PRE_OP: u8 = 2;
-    /// Inputs.
-    pub const SAFE_OP: u8 = 4;
-    /// Inputs and outputs.
-    pub const OP: u8 = 8;
-    /// The last change was refused, or the device left its state; register 0x0134 has the code.
-    pub const ERROR: u8 = 0x10;
-}
-use al_state::{ERROR, INIT, OP, PRE_OP, SAFE_OP};
 
 impl Device {
     pub(super) fn refuse(&mut self, code: u16) {

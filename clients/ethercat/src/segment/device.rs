@@ -1,12 +1,13 @@
 //! One simulated device: its EtherCAT controller (registers, sync managers, distributed clock), and the drive behind it.
 //! ETG1000.4, and the data sheet of the ET1100.
 
-use super::application_layer::al_state::{INIT, OP, SAFE_OP};
 use super::local_clock::LocalClock;
 use super::mechanics::LegForce;
 use super::object_dictionary::{MappedObject, ObjectDictionary};
 use super::servo_drive::{DriveCommand, ServoDrive};
-use super::sii::{self, Identity};
+use super::sii;
+use crate::al_state::{INIT, OP, SAFE_OP};
+use crate::inventory::Identity;
 use crate::objects;
 use crate::units::LegUnits;
 

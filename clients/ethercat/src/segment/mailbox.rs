@@ -1,7 +1,7 @@
 //! Mailbox of a simulated device.
 
-use super::application_layer::al_state::PRE_OP;
 use super::device::{Device, MEMORY};
+use crate::al_state::PRE_OP;
 
 impl Device {
     pub(super) fn receive_mailbox(&mut self) {

@@ -1,7 +1,7 @@
 //! What the simulated drives move: the simulated platform, or six legs without one.
 
-use hexad::model::LEGS;
-use hexad::plant::hardware::Hardware;
+use hexad_core::model::LEGS;
+use hexad_core::plant::hardware::Hardware;
 
 use crate::brake_test::holding_forces;
 

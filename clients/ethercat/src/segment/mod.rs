@@ -14,7 +14,9 @@ pub mod object_dictionary;
 pub mod servo_drive;
 pub mod sii;
 
-use hexad::model::LEGS;
+use hexad_core::model::LEGS;
+
+use crate::link::MAX_FRAME;
 
 use self::device::{Device, DeviceModel};
 use self::mechanics::{LegForce, Mechanics};
@@ -24,8 +26,6 @@ const FIRST_DATAGRAM: usize = 16;
 const DATAGRAM_HEADER: usize = 10;
 const WORKING_COUNTER: usize = 2;
 const ETHERTYPE: [u8; 2] = [0x88, 0xa4];
-/// Longest Ethernet frame without checksum.
-pub const MAX_FRAME: usize = 1514;
 
 /// Commands of datagrams, ETG1000.4 table 2.
 mod command {

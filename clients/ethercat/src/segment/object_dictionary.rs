@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::device::DeviceModel;
-use super::sii::Identity;
 use crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE_BIT;
+use crate::inventory::Identity;
 use crate::objects;
 
 /// Name that object 0x1008 shows.

@@ -1,15 +1,6 @@
 //! Content of a simulated device's EEPROM: the subdevice information interface (SII), ETG1000.6 chapter 5.4.
 
-/// Vendor, product and serial number of a device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Identity {
-    /// Number that the EtherCAT Technology Group has assigned.
-    pub vendor: u32,
-    /// Of the vendor.
-    pub product: u32,
-    /// Of the device.
-    pub serial: u32,
-}
+use crate::inventory::Identity;
 
 /// Receive mailbox, send mailbox, outputs, inputs: start address of each sync manager.
 pub const SYNC_MANAGER_STARTS: [u16; 4] = [0x1000, 0x1080, 0x1100, 0x1400];

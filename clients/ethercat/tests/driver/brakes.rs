@@ -1,6 +1,6 @@
 //! Test of the brakes before they open for the first time.
 
-use hexad::model::LEGS;
+use hexad_core::model::LEGS;
 use hexad_ethercat::brake_test::{self, holding_forces, test_load_n};
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::cia402::DriveState;

@@ -1,11 +1,10 @@
 //! Closed loop in lock-step: driver and segment may add little to the tracking error of the same loop without them.
 
-use hexad::commands::plant::hardware;
-use hexad::control::signals::inputs::Measurement;
-use hexad::control::signals::state::{Request, State};
-use hexad::model::LEGS;
-use hexad::motion::built_in::BuiltInMotion;
-use hexad::realtime::allocation::{CountingAllocator, calls_of_this_thread};
+use hexad_client::realtime::allocation::{CountingAllocator, calls_of_this_thread};
+use hexad_core::control::signals::inputs::Measurement;
+use hexad_core::control::signals::state::{Request, State};
+use hexad_core::model::LEGS;
+use hexad_core::motion::built_in::BuiltInMotion;
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::drives_file::DrivesFile;
 use hexad_ethercat::simulation;
@@ -38,7 +37,8 @@ fn plant_alone(file: &DrivesFile, is_stepped: bool, motion: BuiltInMotion, secon
         let step_n = file.legs[0].units().newtons_per_permille();
         machine.deployment.plant.imperfections.drive.force_step = step_n;
     }
-    let (mut daemon, mut plant) = (TestDaemon::new(&machine, motion, seconds), hardware(&machine));
+    let (mut daemon, mut plant) =
+        (TestDaemon::new(&machine, motion, seconds), machine.deployment.plant.hardware(&machine.machine));
     let (mut now_ns, mut force, mut errors) = (START_NS, None::<[f64; LEGS]>, Errors::default());
     let mut cycle = 0;
     loop {

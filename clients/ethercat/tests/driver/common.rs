@@ -1,6 +1,5 @@
 //! Files, segments and buses of the tests.
 
-use hexad::config::Config;
 use hexad_ethercat::bus::{Bus, Frames};
 use hexad_ethercat::drives_file::{DrivesFile, ErrorList};
 use hexad_ethercat::inventory;
@@ -9,6 +8,7 @@ use hexad_ethercat::simulated_link::SimulatedLink;
 use hexad_ethercat::simulation;
 use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
 use hexad_ethercat::sync_clock::SyncClock;
+use hexad_machine::config::Config;
 
 pub const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
 /// The clock of a computer that has been up for a day.

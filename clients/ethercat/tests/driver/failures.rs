@@ -1,14 +1,16 @@
 //! Table of failures during motion: what becomes of the drives, and how far the platform still moves.
 
-use hexad::control::signals::state::{Request, State};
-use hexad::model::LEGS;
-use hexad::model::task::task_coordinates;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::inputs::Measurement;
+use hexad_core::control::signals::state::{Request, State};
+use hexad_core::model::LEGS;
+use hexad_core::model::task::task_coordinates;
+use hexad_ethercat::al_state::{ERROR, OP, SAFE_OP};
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::cia402::DriveState;
 use hexad_ethercat::cycle::DevicesLost;
 use hexad_ethercat::link::Link;
 use hexad_ethercat::segment::Segment;
-use hexad_ethercat::segment::application_layer::al_state::{ERROR, OP, SAFE_OP};
 use hexad_ethercat::segment::device::DeviceModel;
 
 use super::common::*;
@@ -99,6 +101,40 @@ fn a_fault_is_acknowledged_when_an_operator_clears_the_daemon() {
     rig.cycles(100);
     assert_eq!(rig.drive_states()[3], DriveState::SwitchOnDisabled);
     assert_eq!(rig.driver.daemon.measured.drive_fault, 0);
+}
+
+/// A drive trips under control, and the driver is started anew.
+#[test]
+fn a_fault_is_acknowledged_whether_it_is_cleared_before_or_after_the_driver_is_back() {
+    for is_cleared_before in [true, false] {
+        let frames = Frames::new();
+        let mut rig = moving(&frames);
+        rig.segment().devices[3].trip(0x2310);
+        rig.cycles(1000);
+        assert_eq!(rig.state(), State::Fault);
+        let daemon = &mut rig.driver.daemon;
+        daemon.motion_ns = None;
+        if is_cleared_before {
+            daemon.ask(Request::Clear);
+            daemon.respond(daemon.stamp_ns + 1_000_000, Measurement::from(&daemon.measured));
+            assert_eq!(daemon.output.state, State::Off);
+        }
+        rig = rig.with_new_driver();
+        rig.cycles(100);
+        if !is_cleared_before {
+            assert_eq!(rig.drive_states()[3], DriveState::Fault, "by itself it stays");
+            rig.driver.daemon.ask(Request::Clear);
+            rig.cycles(100);
+        }
+        assert_eq!(rig.drive_states()[3], DriveState::SwitchOnDisabled);
+        // In standby no fault is there to clear: it is refused with the reason.
+        rig.segment().devices[3].trip(0x2310);
+        rig.cycles(100);
+        rig.driver.daemon.ask(Request::Clear);
+        rig.cycles(100);
+        let refusal = rig.driver.daemon.output.request_diagnostic;
+        assert_eq!((refusal.code, rig.drive_states()[3]), (DiagnosticCode::DriveFault, DriveState::Fault));
+    }
 }
 
 #[test]
@@ -229,9 +265,9 @@ fn a_daemon_that_stalls_for_a_moment_changes_nothing() {
 #[test]
 fn an_encoder_may_wrap_in_the_middle_of_the_stroke() {
     let file = drives();
-    let home_m = hexad::model::inverse_geometry::leg_lengths(
+    let home_m = hexad_core::model::inverse_geometry::leg_lengths(
         &machine().machine,
-        &hexad::model::task::TaskState::at_rest(machine().machine.home).motion().pose,
+        &hexad_core::model::task::TaskState::at_rest(machine().machine.home).motion().pose,
     )[0];
     let range_m = file.legs[0].units().metres_per_count() * 2f64.powi(31);
     let text = DRIVES.replace("offset_m = 1.2", &format!("offset_m = {}", home_m + 0.001 - range_m));

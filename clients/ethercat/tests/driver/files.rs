@@ -1,9 +1,9 @@
 //! Drives files: errors, what `scan` prints, what a machine file contradicts.
 
-use hexad::config::Config;
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::drives_file::DrivesFile;
 use hexad_ethercat::{inventory, machine_check, scan, startup};
+use hexad_machine::config::Config;
 
 use super::common::*;
 

@@ -1,16 +1,14 @@
 //! Controller, driver, segment and platform in lock-step on one simulated clock.
 
-use hexad::config::Config;
-use hexad::control::controller::{Controller, Output};
-use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
-use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
-use hexad::daemon;
-use hexad::messages::{ForceMessage, MeasuredMessage, Message};
-use hexad::model::fidelity::Fidelity;
-use hexad::model::task::TaskState;
-use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
-use hexad::motion::timeline::Timeline;
-use hexad::plant::simulator::Simulator;
+use hexad_client::messages::{ForceMessage, MeasuredMessage, Message};
+use hexad_core::control::controller::{Controller, Output};
+use hexad_core::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad_core::control::signals::state::{MessageId, OperatorRequest, Request, State};
+use hexad_core::model::fidelity::Fidelity;
+use hexad_core::model::task::TaskState;
+use hexad_core::motion::built_in::{BuiltInMotion, FittedMotion, fit};
+use hexad_core::motion::timeline::Timeline;
+use hexad_core::plant::simulator::Simulator;
 use hexad_ethercat::bus::Bus;
 use hexad_ethercat::cia402::DriveState;
 use hexad_ethercat::cycle::{Daemon, DevicesLost, Driver};
@@ -19,6 +17,7 @@ use hexad_ethercat::process_data::ProcessData;
 use hexad_ethercat::segment::Segment;
 use hexad_ethercat::segment::mechanics::Mechanics;
 use hexad_ethercat::startup::OpDevices;
+use hexad_machine::config::Config;
 
 use super::common::*;
 
@@ -47,7 +46,7 @@ pub struct TestDaemon {
 
 impl TestDaemon {
     pub fn new(machine: &Config, motion: BuiltInMotion, seconds: f64) -> Self {
-        let parameters = daemon::parameters(&machine.machine, &machine.deployment, Fidelity::Exact);
+        let parameters = hexad_daemon::parameters(&machine.machine, &machine.deployment, Fidelity::Exact);
         let scene = fit(&machine.machine, motion, seconds);
         let home = machine.machine.home.into();
         Self {
@@ -146,14 +145,20 @@ impl<'f> Rig<'f> {
         motion: BuiltInMotion,
         seconds: f64,
     ) -> Self {
-        let mut bus = bus(frames, segment);
+        Self::start(bus(frames, segment), file, TestDaemon::new(&machine(), motion, seconds))
+    }
+
+    fn start(mut bus: TestBus<'f>, file: &DrivesFile, daemon: TestDaemon) -> Self {
         let (devices, clock) = up(&mut bus, file).unwrap();
-        let machine = machine();
-        let actuator = &machine.machine.actuator;
+        let actuator = &machine().machine.actuator;
         let middle_m = actuator.min_length.midpoint(actuator.max_length);
-        let daemon = TestDaemon::new(&machine, motion, seconds);
         let driver = Driver::new(ProcessData::new(file, middle_m, clock), &file.bus, daemon);
         Self { bus, devices, driver }
+    }
+
+    /// A new driver on the same bus, with the same daemon.
+    pub fn with_new_driver(self) -> Self {
+        Self::start(self.bus, &drives(), self.driver.daemon)
     }
 
     pub fn cycle(&mut self) -> Result<(), DevicesLost> {

@@ -1,8 +1,8 @@
 //! Bring-up: what succeeds, and every error in words.
 
+use hexad_ethercat::al_state::{OP, PRE_OP, SAFE_OP};
 use hexad_ethercat::bus::Frames;
 use hexad_ethercat::segment::Segment;
-use hexad_ethercat::segment::application_layer::al_state::{OP, PRE_OP, SAFE_OP};
 use hexad_ethercat::segment::mechanics::Mechanics;
 use hexad_ethercat::simulation;
 

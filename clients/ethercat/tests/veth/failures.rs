@@ -4,12 +4,12 @@ use std::fs;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, MeasuredMessage, Subscriber};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::{Bus, MeasuredMessage, Subscriber};
 
 use super::network::Network;
-use super::stalls::Watchdog;
 use super::{ALONE, not_run, simulated};
+use hexad_support::stalls::Watchdog;
 
 /// Rate of the fastest leg at a failure, at least \[m/s\].
 const MIN_RATE_M_S: f64 = 0.15;

@@ -2,28 +2,30 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 mod failures;
-#[path = "../../../../tests/common/hexad_process.rs"]
-mod hexad_process;
 mod network;
-#[path = "../../../../tests/common/not_run.rs"]
-#[allow(dead_code, reason = "shared with the tests of hexad")]
-mod not_run;
-#[path = "../../../../tests/common/python.rs"]
-mod python;
-#[path = "../../../../tests/common/stalls.rs"]
-mod stalls;
 
 use std::sync::Mutex;
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use std::{env, fs};
 
-use hexad::config::Config;
 use hexad_ethercat::brake_test::holding_forces;
+use hexad_machine::config::Config;
+use hexad_support::stalls::Watchdog;
+use hexad_support::{not_run, python};
 use network::Network;
-use stalls::Watchdog;
 
 const DRIVES: &str = include_str!("../data/motion_base-drives.toml");
+
+/// Not a test, but the role in which tests start this program.
+#[test]
+#[ignore = "not a test, but the process that tests start"]
+fn hexad_process() {
+    hexad_support::hexad_process::play_role();
+}
+
+/// Within this time what has ended is let go.
+const SETTLING: Duration = Duration::from_secs(5);
 
 /// One loop at a time: they are real-time.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -62,7 +64,8 @@ fn plays(network: &mut Network, motion: &str, seconds: u32) -> bool {
         network.signal("move", libc::SIGKILL);
         network.output(network.hexad("clear --config m.toml"));
         sleep(Duration::from_secs(1));
-        network.output(network.hexad("goto --config m.toml --home --engage"));
+        // The host can spoil this one, too; the next motion begins wherever the platform stands.
+        let _ = network.hexad("goto --config m.toml --home --engage").output();
     }
     !has_fault
 }
@@ -90,7 +93,17 @@ fn the_daemon_drives_the_platform_over_the_bus() {
                 "the host pauses the processes of a loop of 1 kHz too long, three times in a row",
             );
         }
-        resources.push(["daemon", "run"].map(|name| network.resources(name)));
+        // The ports of a player that has ended are closed when the daemon next looks.
+        let used = || ["daemon", "run"].map(|name| network.resources(name));
+        let counts = |used: [[usize; 4]; 2]| used.map(|[counts @ .., _]| counts);
+        let began = Instant::now();
+        while resources.first().is_some_and(|first| counts(*first) != counts(used()))
+            && began.elapsed() < SETTLING
+        {
+            sleep(Duration::from_millis(100));
+        }
+        sleep(if resources.is_empty() { SETTLING } else { Duration::ZERO });
+        resources.push(used());
     }
     for ([before @ .., kb_before], [after @ .., kb_after]) in resources[0].iter().zip(&resources[1]) {
         println!("threads, descriptors, shared memory: {before:?}, {after:?}; {kb_before} kB, {kb_after} kB");

@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::hexad_process;
+use hexad_support::hexad_process;
 
 /// Network namespace with the cable, a folder with files, and the processes that run in it.
 pub struct Network {

@@ -1,22 +1,9 @@
 //! The bridge with real ROS 2: rclpy over Fast DDS, from PyPI, on another host. Needs root, `ip`, PyPI once, and Python 3.11.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-#[path = "../../../../tests/common/hexad_process.rs"]
-mod hexad_process;
-#[path = "../../../../tests/common/hosts.rs"]
-#[allow(dead_code, reason = "shared with the tests of other bridges")]
-mod hosts;
-#[path = "../../../../tests/common/not_run.rs"]
-#[allow(dead_code, reason = "shared with the tests of hexad")]
-mod not_run;
-#[path = "../../../../tests/common/python.rs"]
-#[allow(dead_code, reason = "shared with the tests of hexad")]
-mod python;
 #[path = "../../src/ros_messages.rs"]
 #[allow(dead_code, reason = "only the types are needed")]
 mod ros_messages;
-#[path = "../../../../tests/common/stalls.rs"]
-mod stalls;
 mod type_hashes;
 
 use std::fs;
@@ -25,8 +12,16 @@ use std::sync::Mutex;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hosts::{Host, Hosts};
-use stalls::Watchdog;
+use hexad_support::hosts::{Host, Hosts};
+use hexad_support::stalls::Watchdog;
+use hexad_support::{not_run, python};
+
+/// Not a test, but the role in which tests start this program.
+#[test]
+#[ignore = "not a test, but the process that tests start"]
+fn hexad_process() {
+    hexad_support::hexad_process::play_role();
+}
 
 /// Pauses of the host up to this length are no reason to fail: measurements may be 50 ms old.
 const MAX_STALL: Duration = Duration::from_millis(20);
@@ -123,6 +118,18 @@ fn rclpy_reads_the_state_and_moves_the_platform_with_poses() {
     let log = cell.hosts.log("daemon");
     let request = log.lines().find(|line| line.contains("request: stop")).unwrap();
     assert!(request.contains("remote=\"/panel ("), "{request}");
+}
+
+#[test]
+fn the_first_request_of_a_new_client_does_not_wait_for_a_heartbeat() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut cell) = Cell::open("first", "") else { return };
+    // New processes with new clients: DDS discovers each of them while its request arrives.
+    for _ in 0..5 {
+        if !cell.reaches("new_clients", "end of new_clients") {
+            return;
+        }
+    }
 }
 
 #[test]

@@ -165,6 +165,18 @@ def poses():
     assert not parks.wait_for_service(timeout_sec=1.0), "not among the requests of the file"
 
 
+def new_clients():
+    for _ in range(4):
+        client = node.create_client(Trigger, "/stop")
+        wait("service stop", client.service_is_ready)
+        sent = time.monotonic()
+        future = client.call_async(Trigger.Request())
+        wait("an answer", future.done)
+        print("answered after", time.monotonic() - sent, flush=True)
+        assert time.monotonic() - sent < 1.0, "Fast DDS repeats its heartbeat after 3 s"
+        node.destroy_client(client)
+
+
 def trajectory():
     state()
     source = Source(MultiDOFJointTrajectory, "/setpoint_trajectory", 200, setpoint)

@@ -38,6 +38,14 @@ fn a_motion_ends_with_the_token_of_its_client() {
 }
 
 #[test]
+fn a_motion_ends_with_its_session_and_only_with_it() {
+    let Some(mut cell) = Cell::open("sessions") else { return };
+    cell.start(CABLE);
+    cell.start_client("sessions", CABLE, "studio");
+    cell.reaches("sessions", "end of sessions");
+}
+
+#[test]
 fn a_killed_bridge_is_a_lost_source() {
     let Some(mut cell) = Cell::open("killed") else { return };
     cell.start(CABLE);

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::hosts::Host;
 use crate::{BRIDGE, Cell, machine_file, network_file};
+use hexad_support::hosts::Host;
 
 const DAEMONS: [&str; 10] = ["d0", "d1", "d2", "d3", "d4", "d5", "d6", "d7", "d8", "d9"];
 const BRIDGES: [&str; 10] = ["b0", "b1", "b2", "b3", "b4", "b5", "b6", "b7", "b8", "b9"];

@@ -6,19 +6,7 @@ mod certificates;
 mod control;
 mod enemies;
 mod fleet;
-#[path = "../../../../tests/common/hexad_process.rs"]
-mod hexad_process;
-#[path = "../../../../tests/common/hosts.rs"]
-mod hosts;
 mod loss;
-#[path = "../../../../tests/common/not_run.rs"]
-#[allow(dead_code, reason = "shared with the tests of hexad")]
-mod not_run;
-#[path = "../../../../tests/common/python.rs"]
-#[allow(dead_code, reason = "shared with the tests of hexad")]
-mod python;
-#[path = "../../../../tests/common/stalls.rs"]
-mod stalls;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,8 +14,16 @@ use std::sync::{Mutex, MutexGuard};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hosts::{Host, Hosts};
-use stalls::Watchdog;
+use hexad_support::hosts::{Host, Hosts};
+use hexad_support::stalls::Watchdog;
+use hexad_support::{not_run, python};
+
+/// Not a test, but the role in which tests start this program.
+#[test]
+#[ignore = "not a test, but the process that tests start"]
+fn hexad_process() {
+    hexad_support::hexad_process::play_role();
+}
 
 /// Pauses of the host up to this length are no reason to fail: measurements may be 50 ms old.
 const MAX_STALL: Duration = Duration::from_millis(20);

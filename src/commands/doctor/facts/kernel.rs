@@ -2,7 +2,7 @@
 
 use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
-use crate::realtime::clock_cost::ClockCost;
+use hexad_client::realtime::clock_cost::ClockCost;
 
 /// Least share of the time that real-time threads must be allowed. A loop that sleeps or spins for half of
 /// its period needs less, including the I/O thread.
@@ -105,9 +105,7 @@ pub fn clock(host: &HostFiles, cost: &ClockCost) -> Examined {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::doctor::facts::Assessment;
-    use crate::commands::doctor::facts::tests::examined;
-    use crate::commands::doctor::files::sample::host;
+    use crate::commands::doctor::facts::tests::*;
 
     const RELEASE: (&str, &str) = ("proc/sys/kernel/osrelease", "6.12.1");
 
@@ -121,70 +119,53 @@ mod tests {
     fn preemption_models_are_distinguished() {
         let debug = "sys/kernel/debug/sched/preempt";
         let line = |text: &'static str| ("proc/cmdline", text);
+        let config = |text: &'static str| ("boot/config-6.12.1", text);
         let dynamic = "#1 SMP PREEMPT_DYNAMIC Debian 6.12.1";
         for (version, more, assessment, words) in [
-            ("#1 SMP PREEMPT_RT Debian 6.12.1", vec![], Assessment::Good, "Linux 6.12.1, PREEMPT_RT"),
-            ("#1 SMP odd", vec![("sys/kernel/realtime", "1")], Assessment::Good, "PREEMPT_RT"),
-            ("#1 SMP odd", vec![("sys/kernel/realtime", "0")], Assessment::Bad, "not preemptible"),
-            ("#1 SMP PREEMPT x", vec![], Assessment::Fair, "not PREEMPT_RT"),
-            ("#1 SMP x", vec![], Assessment::Bad, "not preemptible"),
-            (dynamic, vec![(debug, "none voluntary (full) lazy")], Assessment::Fair, "preempt=full"),
-            (dynamic, vec![(debug, "none (voluntary) full")], Assessment::Bad, "preempt=voluntary"),
-            (dynamic, vec![(debug, "(none) full"), line("preempt=full")], Assessment::Bad, "preempt=none"),
-            (dynamic, vec![line("quiet preempt=none preempt=full")], Assessment::Fair, "preempt=full"),
-            (
-                dynamic,
-                vec![("boot/config-6.12.1", "CONFIG_PREEMPT_BUILD=y\nCONFIG_PREEMPT_NONE=y")],
-                Assessment::Bad,
-                "preempt=none",
-            ),
-            (dynamic, vec![("boot/config-6.12.1", "CONFIG_PREEMPT=y")], Assessment::Fair, "preempt=full"),
-            (
-                dynamic,
-                vec![line("quiet")],
-                Assessment::Unknown,
-                "there is no /sys/kernel/debug/sched/preempt",
-            ),
-            (dynamic, vec![(debug, "odd")], Assessment::Unknown, "sched/preempt is \"odd\""),
+            ("#1 SMP PREEMPT_RT Debian 6.12.1", vec![], Good, "Linux 6.12.1, PREEMPT_RT"),
+            ("#1 SMP odd", vec![("sys/kernel/realtime", "1")], Good, "PREEMPT_RT"),
+            ("#1 SMP odd", vec![("sys/kernel/realtime", "0")], Bad, "not preemptible"),
+            ("#1 SMP PREEMPT x", vec![], Fair, "not PREEMPT_RT"),
+            ("#1 SMP x", vec![], Bad, "not preemptible"),
+            (dynamic, vec![(debug, "none voluntary (full) lazy")], Fair, "preempt=full"),
+            (dynamic, vec![(debug, "none (voluntary) full")], Bad, "preempt=voluntary"),
+            (dynamic, vec![(debug, "(none) full"), line("preempt=full")], Bad, "preempt=none"),
+            (dynamic, vec![line("quiet preempt=none preempt=full")], Fair, "preempt=full"),
+            (dynamic, vec![config("CONFIG_PREEMPT_BUILD=y\nCONFIG_PREEMPT_NONE=y")], Bad, "preempt=none"),
+            (dynamic, vec![config("CONFIG_PREEMPT=y")], Fair, "preempt=full"),
+            (dynamic, vec![line("quiet")], Unknown, "there is no /sys/kernel/debug/sched/preempt"),
+            (dynamic, vec![(debug, "odd")], Unknown, "sched/preempt is \"odd\""),
         ] {
             let fact = kernel(version, &more);
             assert_eq!(fact.assessment, assessment, "{version} {more:?}: {fact:?}");
             assert!(fact.found.contains(words), "{fact:?}");
-            assert_eq!(fact.remedy.is_none(), assessment == Assessment::Good, "{fact:?}");
+            assert_eq!(fact.remedy.is_none(), assessment == Good, "{fact:?}");
         }
-        assert_eq!(
-            examined(preemption(&host(&[RELEASE]).files)).found,
-            "there is no /proc/sys/kernel/version"
-        );
+        let unknown = examined(preemption(&host(&[RELEASE]).files));
+        assert_eq!(unknown.found, "there is no /proc/sys/kernel/version");
     }
 
     #[test]
     fn throttling_is_good_where_the_loop_does_not_meet_it() {
-        for (runtime, period, assessment) in [
-            ("-1", "1000000", Assessment::Good),
-            ("950000", "1000000", Assessment::Good),
-            ("500000", "1000000", Assessment::Bad),
-            ("0", "1000000", Assessment::Bad),
-            ("all", "1000000", Assessment::Unknown),
-        ] {
-            let host = host(&[
+        for (runtime, assessment) in
+            [("-1", Good), ("950000", Good), ("500000", Bad), ("0", Bad), ("all", Unknown)]
+        {
+            let files = [
                 ("proc/sys/kernel/sched_rt_runtime_us", runtime),
-                ("proc/sys/kernel/sched_rt_period_us", period),
-            ]);
-            assert_eq!(examined(throttling(&host.files)).assessment, assessment, "{runtime} of {period}");
+                ("proc/sys/kernel/sched_rt_period_us", "1000000"),
+            ];
+            assert_facts(throttling, &[(&files, assessment), (&[], Unknown)]);
         }
-        assert_eq!(examined(throttling(&host(&[]).files)).assessment, Assessment::Unknown);
     }
 
     #[test]
     fn a_clock_that_costs_a_system_call_is_bad() {
-        let empty = host(&[]);
         let host = host(&[("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc")]);
         let fact =
             |reading_ns| examined(clock(&host.files, &ClockCost { reading_ns, system_call_ns: 120.0 }));
         assert_eq!(fact(25.0), Fact::good("tsc, 25 ns a reading, without a system call"));
-        assert_eq!(fact(125.0).assessment, Assessment::Bad);
+        assert_eq!(fact(125.0).assessment, Bad);
         let cost = ClockCost { reading_ns: 25.0, system_call_ns: 120.0 };
-        assert_eq!(examined(clock(&empty.files, &cost)).assessment, Assessment::Unknown);
+        assert_facts(|files| clock(files, &cost), &[(&[], Unknown)]);
     }
 }

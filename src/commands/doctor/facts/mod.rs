@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 use self::permissions::RefusedRights;
 use self::processors::LoopCpus;
 use super::files::HostFiles;
-use crate::config::deployment::Realtime;
-use crate::messages::location::{user_folder, user_id};
-use crate::model::machine::at_most_256_bits;
-use crate::realtime::clock_cost::ClockCost;
-use crate::realtime::setup::permissions::Permissions;
+use hexad_client::messages::location::{user_folder, user_id};
+use hexad_client::realtime::clock_cost::ClockCost;
+use hexad_client::realtime::setup::permissions::Permissions;
+use hexad_core::model::machine::at_most_256_bits;
+use hexad_machine::config::deployment::Realtime;
 
 mod kernel;
 pub mod permissions;
@@ -114,10 +114,20 @@ fn named(name: &str, examined: Examined) -> Fact {
 
 #[cfg(test)]
 mod tests {
+    pub use super::Assessment::{Bad, Fair, Good, Unknown};
     use super::*;
+    pub use crate::commands::doctor::files::sample::host;
 
     /// A fact as [`all`] returns it, without the name.
     pub fn examined(examined: Examined) -> Fact {
         named("", examined)
+    }
+
+    /// Asserts what a fact is on hosts with these files.
+    pub fn assert_facts(fact: impl Fn(&HostFiles) -> Examined, rows: &[(&[(&str, &str)], Assessment)]) {
+        for (files, assessment) in rows {
+            let fact = examined(fact(&host(files).files));
+            assert_eq!(fact.assessment, *assessment, "{files:?}: {fact:?}");
+        }
     }
 }

@@ -2,10 +2,10 @@
 //! kernel files.
 
 use super::Fact;
-use crate::config::deployment::{Realtime, Scheduler};
-use crate::realtime::setup::Shortfall;
-use crate::realtime::setup::budget::GroupBudget;
-use crate::realtime::setup::permissions::Permissions;
+use hexad_client::realtime::setup::Shortfall;
+use hexad_client::realtime::setup::budget::GroupBudget;
+use hexad_client::realtime::setup::permissions::Permissions;
+use hexad_machine::config::deployment::{Realtime, Scheduler};
 
 /// Rights that this host refused to the set-up of the daemon.
 #[derive(Clone, Debug, Default)]
@@ -93,8 +93,8 @@ pub fn container(permissions: &Permissions) -> Fact {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::commands::doctor::facts::Assessment;
-    use crate::config::Config;
+    use crate::commands::doctor::facts::tests::*;
+    use hexad_machine::config::Config;
 
     fn shortfall(what: &str) -> Shortfall {
         Shortfall { what: what.into(), reason: "it is not allowed".into(), remedy: "allow it".into() }
@@ -114,13 +114,9 @@ mod tests {
         };
         let facts = scheduling(&permissions, &realtime(), &refused);
         let found: Vec<_> = facts.iter().map(|fact| (fact.assessment, fact.found.as_str())).collect();
-        assert_eq!(
-            found,
-            [
-                (Assessment::Bad, "no FIFO priority 80: it is not allowed"),
-                (Assessment::Bad, "no binding to CPU 7: it is not allowed")
-            ]
-        );
+        let [priority, binding] =
+            ["no FIFO priority 80", "no binding to CPU 7"].map(|what| format!("{what}: it is not allowed"));
+        assert_eq!(found, [(Bad, priority.as_str()), (Bad, binding.as_str())]);
         let fact = locked_memory(&permissions, &realtime(), &refused);
         assert_eq!(fact, Fact::bad("no locked memory: it is not allowed", "allow it"));
     }
@@ -147,7 +143,7 @@ mod tests {
         let limits = ["FIFO priority 80 granted (RLIMIT_RTPRIO 90)", "granted (RLIMIT_MEMLOCK unlimited)"];
         assert_eq!(found(&lesser), limits.map(ToString::to_string));
         let unlocked = Realtime { lock_memory: false, ..realtime() };
-        assert_eq!(locked_memory(&greater, &unlocked, &refused).assessment, Assessment::Bad);
+        assert_eq!(locked_memory(&greater, &unlocked, &refused).assessment, Bad);
     }
 
     #[test]
@@ -157,12 +153,12 @@ mod tests {
         let refused =
             RefusedRights { thread: vec![shortfall("FIFO priority 80")], ..RefusedRights::default() };
         for (group_budget, refused, assessment) in [
-            (GroupBudget::Unlimited, &refused, Assessment::Good),
-            (of(0), &refused, Assessment::Bad),
-            (of(-1), &refused, Assessment::Good),
-            (of(950_000), &refused, Assessment::Good),
-            (unseen.clone(), &refused, Assessment::Unknown),
-            (unseen, &RefusedRights::default(), Assessment::Good),
+            (GroupBudget::Unlimited, &refused, Good),
+            (of(0), &refused, Bad),
+            (of(-1), &refused, Good),
+            (of(950_000), &refused, Good),
+            (unseen.clone(), &refused, Unknown),
+            (unseen, &RefusedRights::default(), Good),
         ] {
             let permissions = Permissions { group_budget, ..Permissions::of_this_process() };
             let fact = cgroup(&permissions, refused);
@@ -172,11 +168,9 @@ mod tests {
 
     #[test]
     fn containers_are_distinguished() {
-        for (inside, user_namespace, assessment) in [
-            (false, false, Assessment::Good),
-            (true, false, Assessment::Fair),
-            (true, true, Assessment::Fair),
-        ] {
+        for (inside, user_namespace, assessment) in
+            [(false, false, Good), (true, false, Fair), (true, true, Fair)]
+        {
             let facts = Permissions { container: inside, user_namespace, ..Permissions::of_this_process() };
             assert_eq!(container(&facts).assessment, assessment);
         }

@@ -3,7 +3,7 @@
 use super::processors::{CPU, LoopCpus};
 use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
-use crate::realtime::setup::Shortfall;
+use hexad_client::realtime::setup::Shortfall;
 
 /// Exit latency up to which an idle state hardly affects a wake-up, which takes tens of microseconds \[us\].
 const MAX_SHALLOW_EXIT_US: i64 = 10;
@@ -73,10 +73,8 @@ fn deepest_state(host: &HostFiles, chosen: &LoopCpus) -> Result<Option<(i64, Str
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::doctor::facts::Assessment;
     use crate::commands::doctor::facts::processors::tests::chosen;
-    use crate::commands::doctor::facts::tests::examined;
-    use crate::commands::doctor::files::sample::host;
+    use crate::commands::doctor::facts::tests::*;
 
     #[test]
     fn governors_of_the_used_processors_count() {
@@ -85,11 +83,11 @@ mod tests {
         let files: Vec<_> = files.iter().map(|(path, text)| (path.as_str(), *text)).collect();
         let host = host(&files);
         for (realtime, io, permitted, assessment) in [
-            (Some(1), Some(2), "0-2", Assessment::Good),
-            (Some(1), Some(0), "0-2", Assessment::Fair),
-            (None, None, "0-2", Assessment::Fair),
-            (None, None, "1-2", Assessment::Good),
-            (Some(1), Some(3), "0-3", Assessment::Unknown),
+            (Some(1), Some(2), "0-2", Good),
+            (Some(1), Some(0), "0-2", Fair),
+            (None, None, "0-2", Fair),
+            (None, None, "1-2", Good),
+            (Some(1), Some(3), "0-3", Unknown),
         ] {
             let fact = examined(frequency(&host.files, &chosen(realtime, io, permitted)));
             assert_eq!(fact.assessment, assessment, "{realtime:?} {io:?}: {fact:?}");
@@ -118,18 +116,17 @@ mod tests {
             Shortfall { what: "bound".into(), reason: "it is not allowed".into(), remedy: "allow it".into() };
         let one = chosen(Some(0), Some(0), "0");
         for (deep, off, bound_us, against, assessment) in [
-            ("133", "0", 0, None, Assessment::Good),
-            ("133", "0", 200, None, Assessment::Fair),
-            ("133", "0", 0, Some(&against), Assessment::Fair),
-            ("133", "1", 0, Some(&against), Assessment::Good),
-            ("2", "0", 0, Some(&against), Assessment::Good),
-            ("deep", "0", 0, None, Assessment::Unknown),
+            ("133", "0", 0, None, Good),
+            ("133", "0", 200, None, Fair),
+            ("133", "0", 0, Some(&against), Fair),
+            ("133", "1", 0, Some(&against), Good),
+            ("2", "0", 0, Some(&against), Good),
+            ("deep", "0", 0, None, Unknown),
         ] {
             let fact = examined(idle(&files(deep, off).files, &one, bound_us, against));
             assert_eq!(fact.assessment, assessment, "{deep} {off} {bound_us}: {fact:?}");
         }
-        let none = host(&[("sys/devices/system/cpu/cpuidle/current_driver", "none")]);
-        assert_eq!(examined(idle(&none.files, &one, 0, None)).assessment, Assessment::Good);
-        assert_eq!(examined(idle(&host(&[]).files, &one, 0, None)).assessment, Assessment::Unknown);
+        let none = ("sys/devices/system/cpu/cpuidle/current_driver", "none");
+        assert_facts(|files| idle(files, &one, 0, None), &[(&[none], Good), (&[], Unknown)]);
     }
 }

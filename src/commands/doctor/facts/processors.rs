@@ -5,10 +5,10 @@ use fearless_simd::Level;
 use super::kernel::boot_parameter;
 use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
-use crate::daemon::SLOW_ARITHMETIC;
-use crate::daemon::recorder::instruction_set;
-use crate::model::machine::has_native_arithmetic;
-use crate::realtime::setup::cpus::Cpus;
+use hexad_client::realtime::setup::cpus::Cpus;
+use hexad_core::model::machine::has_native_arithmetic;
+use hexad_daemon::SLOW_ARITHMETIC;
+use hexad_daemon::recorder::instruction_set;
 
 /// Least number of processors: one for the real-time thread and one for the I/O thread.
 const MIN_PROCESSORS: usize = 2;
@@ -156,9 +156,7 @@ pub fn interrupts(host: &HostFiles, chosen: &LoopCpus) -> Option<Fact> {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::commands::doctor::facts::Assessment;
-    use crate::commands::doctor::facts::tests::examined;
-    use crate::commands::doctor::files::sample::host;
+    use crate::commands::doctor::facts::tests::*;
 
     pub fn chosen(realtime: Option<usize>, io: Option<usize>, permitted: &str) -> LoopCpus {
         LoopCpus { realtime, io, permitted: Cpus::parse(permitted).unwrap() }
@@ -167,11 +165,11 @@ pub mod tests {
     #[test]
     fn two_threads_need_two_processors() {
         for (realtime, io, permitted, assessment) in [
-            (None, None, "0", Assessment::Bad),
-            (None, None, "0,5", Assessment::Fair),
-            (Some(1), Some(0), "0-1", Assessment::Fair),
-            (Some(1), Some(2), "0-3", Assessment::Good),
-            (Some(1), Some(1), "0-3", Assessment::Bad),
+            (None, None, "0", Bad),
+            (None, None, "0,5", Fair),
+            (Some(1), Some(0), "0-1", Fair),
+            (Some(1), Some(2), "0-3", Good),
+            (Some(1), Some(1), "0-3", Bad),
         ] {
             let fact = count(&chosen(realtime, io, permitted));
             assert_eq!(fact.assessment, assessment, "{fact:?}");
@@ -180,11 +178,11 @@ pub mod tests {
 
     #[test]
     fn a_processor_without_sse4_2_is_slow() {
-        assert_eq!(arithmetic(Level::baseline()).assessment, Assessment::Fair);
+        assert_eq!(arithmetic(Level::baseline()).assessment, Fair);
         let best = Level::new();
         if let Some(sse4_2) = best.as_sse4_2() {
             assert_eq!(arithmetic(Level::Sse4_2(sse4_2)), Fact::good("Sse4_2"));
-            assert_eq!(arithmetic(best).assessment, Assessment::Good);
+            assert_eq!(arithmetic(best).assessment, Good);
         }
     }
 
@@ -195,20 +193,15 @@ pub mod tests {
         let line = "proc/cmdline";
         let (mine, any) = (chosen(Some(3), None, "0-3"), chosen(None, None, "0-3"));
         for (files, chosen, assessment, words) in [
-            (vec![(isolated, "")], &any, Assessment::Fair, "isolated: none"),
-            (vec![(isolated, "2-3")], &any, Assessment::Fair, "isolated: 2-3"),
-            (vec![(isolated, "")], &mine, Assessment::Fair, "shared with everything"),
-            (vec![(isolated, "2")], &mine, Assessment::Fair, "shared with everything"),
-            (vec![(isolated, "2-3")], &mine, Assessment::Fair, "ticking and with RCU"),
-            (
-                vec![(isolated, "3"), (ticks, "(null)"), (line, "rcu_nocbs=3")],
-                &mine,
-                Assessment::Fair,
-                "ticking",
-            ),
-            (vec![(isolated, "3"), (ticks, "1-3")], &mine, Assessment::Good, "without ticks"),
-            (vec![(isolated, "three")], &mine, Assessment::Unknown, "no list of CPUs"),
-            (vec![], &mine, Assessment::Unknown, "there is no /sys/devices"),
+            (vec![(isolated, "")], &any, Fair, "isolated: none"),
+            (vec![(isolated, "2-3")], &any, Fair, "isolated: 2-3"),
+            (vec![(isolated, "")], &mine, Fair, "shared with everything"),
+            (vec![(isolated, "2")], &mine, Fair, "shared with everything"),
+            (vec![(isolated, "2-3")], &mine, Fair, "ticking and with RCU"),
+            (vec![(isolated, "3"), (ticks, "(null)"), (line, "rcu_nocbs=3")], &mine, Fair, "ticking"),
+            (vec![(isolated, "3"), (ticks, "1-3")], &mine, Good, "without ticks"),
+            (vec![(isolated, "three")], &mine, Unknown, "no list of CPUs"),
+            (vec![], &mine, Unknown, "there is no /sys/devices"),
         ] {
             let fact = examined(isolation(&host(&files).files, chosen));
             assert_eq!(fact.assessment, assessment, "{files:?}: {fact:?}");
@@ -221,16 +214,10 @@ pub mod tests {
         let list = "sys/devices/system/cpu/cpu1/topology/thread_siblings_list";
         let active = "sys/devices/system/cpu/smt/active";
         let (mine, any) = (chosen(Some(1), None, "0-3"), chosen(None, None, "0-3"));
-        for (files, chosen, assessment) in [
-            (vec![(list, "1")], &mine, Assessment::Good),
-            (vec![(list, "1,3")], &mine, Assessment::Fair),
-            (vec![], &mine, Assessment::Unknown),
-            (vec![(active, "0")], &any, Assessment::Good),
-            (vec![(active, "1")], &any, Assessment::Fair),
-            (vec![], &any, Assessment::Unknown),
-        ] {
-            assert_eq!(examined(siblings(&host(&files).files, chosen)).assessment, assessment, "{files:?}");
-        }
+        let rows: [(&[_], _); 3] = [(&[(list, "1")], Good), (&[(list, "1,3")], Fair), (&[], Unknown)];
+        assert_facts(|files| siblings(files, &mine), &rows);
+        let rows: [(&[_], _); 3] = [(&[(active, "0")], Good), (&[(active, "1")], Fair), (&[], Unknown)];
+        assert_facts(|files| siblings(files, &any), &rows);
         let fact = examined(siblings(&host(&[(list, "1,3")]).files, &mine));
         assert_eq!(fact.remedy.unwrap(), "echo 0 > /sys/devices/system/cpu/cpu3/online");
     }
@@ -242,10 +229,10 @@ pub mod tests {
         let here = ("proc/irq/25/smp_affinity_list", "0-1");
         let balance = ("proc/77/comm", "irqbalance");
         for (files, assessment, words) in [
-            (vec![elsewhere], Assessment::Good, "none of 1 on CPU 1"),
-            (vec![elsewhere, here], Assessment::Fair, "1 of 2 may hit CPU 1"),
-            (vec![elsewhere, balance], Assessment::Fair, "irqbalance moves them"),
-            (vec![], Assessment::Unknown, "nothing in /proc/irq"),
+            (vec![elsewhere], Good, "none of 1 on CPU 1"),
+            (vec![elsewhere, here], Fair, "1 of 2 may hit CPU 1"),
+            (vec![elsewhere, balance], Fair, "irqbalance moves them"),
+            (vec![], Unknown, "nothing in /proc/irq"),
         ] {
             let fact = interrupts(&host(&files).files, &mine).unwrap();
             assert_eq!(fact.assessment, assessment, "{fact:?}");

@@ -97,69 +97,61 @@ pub fn removed_memory(host: &HostFiles, user_id: u32) -> Examined {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::doctor::facts::Assessment;
-    use crate::commands::doctor::facts::tests::examined;
-    use crate::commands::doctor::files::sample::host;
+    use crate::commands::doctor::facts::tests::*;
 
     #[test]
     fn virtual_machines_are_distinguished_from_real_ones() {
         let cpuinfo = |text: &'static str| ("proc/cpuinfo", text);
-        for (files, assessment) in [
-            (vec![cpuinfo("processor : 0\nflags\t\t: fpu hypervisor avx")], Assessment::Bad),
-            (vec![cpuinfo("processor : 0\nflags\t\t: fpu avx")], Assessment::Good),
-            (vec![cpuinfo("processor : 0"), ("proc/device-tree/hypervisor/x", "")], Assessment::Bad),
-            (vec![cpuinfo("processor : 0"), ("proc/device-tree/model", "")], Assessment::Good),
-            (vec![cpuinfo("processor : 0")], Assessment::Unknown),
-            (vec![], Assessment::Unknown),
-        ] {
-            assert_eq!(examined(machine(&host(&files).files)).assessment, assessment, "{files:?}");
-        }
+        let plain = cpuinfo("processor : 0");
+        assert_facts(
+            machine,
+            &[
+                (&[cpuinfo("processor : 0\nflags\t\t: fpu hypervisor avx")], Bad),
+                (&[cpuinfo("processor : 0\nflags\t\t: fpu avx")], Good),
+                (&[plain, ("proc/device-tree/hypervisor/x", "")], Bad),
+                (&[plain, ("proc/device-tree/model", "")], Good),
+                (&[plain], Unknown),
+                (&[], Unknown),
+            ],
+        );
     }
 
     #[test]
     fn swap_is_seen() {
-        let header = "Filename Type Size Used Priority";
-        for (files, assessment) in [
-            (vec![("proc/swaps", header)], Assessment::Good),
-            (vec![("proc/swaps", "Filename Type\n/dev/sda2 partition")], Assessment::Fair),
-            (vec![], Assessment::Unknown),
-        ] {
-            assert_eq!(examined(swap(&host(&files).files)).assessment, assessment, "{files:?}");
-        }
+        let header = ("proc/swaps", "Filename Type Size Used Priority");
+        let used = ("proc/swaps", "Filename Type\n/dev/sda2 partition");
+        assert_facts(swap, &[(&[header], Good), (&[used], Fair), (&[], Unknown)]);
     }
 
     #[test]
     fn huge_pages_are_good_where_nobody_makes_them_unasked() {
-        let setting = "sys/kernel/mm/transparent_hugepage/enabled";
-        for (text, assessment) in [
-            ("[always] madvise never", Assessment::Fair),
-            ("always [madvise] never", Assessment::Good),
-            ("always madvise [never]", Assessment::Good),
-            ("always", Assessment::Unknown),
-        ] {
-            assert_eq!(
-                examined(huge_pages(&host(&[(setting, text)]).files)).assessment,
-                assessment,
-                "{text}"
-            );
-        }
-        assert_eq!(examined(huge_pages(&host(&[]).files)).assessment, Assessment::Unknown);
+        let setting = |text: &'static str| ("sys/kernel/mm/transparent_hugepage/enabled", text);
+        assert_facts(
+            huge_pages,
+            &[
+                (&[setting("[always] madvise never")], Fair),
+                (&[setting("always [madvise] never")], Good),
+                (&[setting("always madvise [never]")], Good),
+                (&[setting("always")], Unknown),
+                (&[], Unknown),
+            ],
+        );
     }
 
     #[test]
     fn logind_deletes_the_shared_memory_of_users_who_log_out() {
         let systemd = ("run/systemd/system", "");
         let conf = |text: &'static str| ("etc/systemd/logind.conf", text);
-        for (files, user_id, assessment) in [
-            (vec![systemd], 999, Assessment::Good),
-            (vec![], 1000, Assessment::Good),
-            (vec![systemd], 1000, Assessment::Bad),
-            (vec![systemd, conf("[Login]\n#RemoveIPC=no")], 1000, Assessment::Bad),
-            (vec![systemd, conf("[Login]\nRemoveIPC=no")], 1000, Assessment::Good),
-        ] {
-            let fact = examined(removed_memory(&host(&files).files, user_id));
-            assert_eq!(fact.assessment, assessment, "{files:?}, {user_id}");
-        }
+        assert_facts(|files| removed_memory(files, 999), &[(&[systemd], Good)]);
+        assert_facts(
+            |files| removed_memory(files, 1000),
+            &[
+                (&[], Good),
+                (&[systemd], Bad),
+                (&[systemd, conf("[Login]\n#RemoveIPC=no")], Bad),
+                (&[systemd, conf("[Login]\nRemoveIPC=no")], Good),
+            ],
+        );
     }
 
     #[test]
@@ -168,16 +160,9 @@ mod tests {
         let memory = "25 24 0:23 / /dev/shm rw shared:3 - tmpfs tmpfs rw,size=24684084k";
         let both = "25 24 8:1 / /dev/shm rw - ext4 /dev/sda1 rw\n26 25 0:23 / /dev/shm rw - tmpfs tmpfs rw";
         let elsewhere = "25 24 0:23 / /tmp rw - tmpfs tmpfs rw";
-        let folder = Path::new("/run/hexad");
-        for (mounts, assessment) in [
-            (memory, Assessment::Good),
-            (both, Assessment::Good),
-            (disk, Assessment::Bad),
-            (elsewhere, Assessment::Bad),
-        ] {
-            let fact = examined(shared_memory(&host(&[("proc/self/mountinfo", mounts)]).files, folder));
-            assert_eq!(fact.assessment, assessment, "{mounts}: {fact:?}");
+        for (mounts, assessment) in [(memory, Good), (both, Good), (disk, Bad), (elsewhere, Bad)] {
+            let fact = |files: &HostFiles| shared_memory(files, Path::new("/run/hexad"));
+            assert_facts(fact, &[(&[("proc/self/mountinfo", mounts)], assessment), (&[], Unknown)]);
         }
-        assert_eq!(examined(shared_memory(&host(&[]).files, folder)).assessment, Assessment::Unknown);
     }
 }

@@ -5,9 +5,9 @@ use std::fs;
 use serde::Deserialize;
 
 use crate::commands::quantity::{angle, length};
-use crate::model::rigid::Pose;
-use crate::model::task::{TaskState, task_coordinates};
-use crate::motion::rotation_order::RotationOrder;
+use hexad_core::model::rigid::Pose;
+use hexad_core::model::task::{TaskState, task_coordinates};
+use hexad_core::motion::rotation_order::RotationOrder;
 
 /// Formats by name.
 const KNOWN: [(&str, &str); 3] = [
@@ -230,7 +230,7 @@ fn xplane_record(bytes: &[u8], number: u32) -> Option<&[u8]> {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::config::Config;
+    use hexad_machine::config::Config;
 
     fn read(name: &str, bytes: &[u8]) -> Option<[f64; 6]> {
         let machine = Config::parse(DEFAULT_CONFIG, "a test").unwrap().machine;
@@ -270,10 +270,7 @@ mod tests {
         let simtools: Vec<_> =
             [65535_u16, 0, 32768, 65535, 32767, 0].iter().flat_map(|v| v.to_be_bytes()).collect();
         let found = read("simtools", &simtools).unwrap();
-        assert!(
-            (found[3] - 0.1).abs() < 2e-6 && (found[4] + 0.1).abs() < 2e-6 && found[5].abs() < 2e-6,
-            "{found:?}"
-        );
+        assert!([found[3] - 0.1, found[4] + 0.1, found[5]].iter().all(|x| x.abs() < 2e-6), "{found:?}");
     }
 
     #[test]

@@ -18,20 +18,19 @@ use self::datagram_format::{Datagram, DatagramFormat, FormatError};
 use self::restarting_clock::RestartingClock;
 use self::status_feed::StatusFeed;
 use super::PlaybackOptions;
-use crate::analysis::target_motion::check_target;
 use crate::commands::failure::{CommandError, INTERRUPTED, default_exit_code};
-use crate::commands::plant::prepare_thread;
 use crate::commands::quantity::{angle, length, list};
-use crate::config::Config;
-use crate::control::parameters::ViolationPolicy;
-use crate::daemon::constants;
-use crate::daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
-use crate::messages::Bus;
-use crate::messages::clock::monotonic_ns;
-use crate::model::task::pose_of;
-use crate::motion::minimum_jerk::{rise, straight_move};
-use crate::operator::requests::status;
-use crate::realtime::stop_request::Stop;
+use hexad_client::messages::Bus;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::operator::requests::status;
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::parameters::ViolationPolicy;
+use hexad_core::model::task::pose_of;
+use hexad_core::motion::minimum_jerk::{rise, straight_move};
+use hexad_daemon::constants;
+use hexad_daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
+use hexad_machine::analysis::target_motion::{TargetRefusal, check_target};
+use hexad_machine::config::Config;
 
 mod datagram_format;
 mod restarting_clock;
@@ -121,7 +120,8 @@ pub fn follow(
     let mut receiver = Receiver::open(config, address, options)?;
     let boarding = options.boarding.unwrap_or(config.machine.home);
     let constants = constants(config);
-    check_target(&constants, &pose_of(&boarding)).map_err(TargetError::from)?;
+    let checked = check_target(&constants, &pose_of(&boarding));
+    checked.map_err(|bound| TargetError::from(TargetRefusal::Target(bound)))?;
     let bus = config.join().map_err(TargetError::from)?;
     let mut source = open_source(config, &bus, playback.engage_within(), stop)?;
     info!(%address, "moves to the boarding pose, then waits for datagrams");
@@ -187,7 +187,7 @@ fn open_source<'a>(
     }
     let feed = StatusFeed::start(config, &answer, within, stop);
     let source = TargetSource::open(config, bus, feed, within.is_some())?;
-    prepare_thread(config);
+    config.deployment.realtime.prepare_peer_thread();
     Ok(source)
 }
 

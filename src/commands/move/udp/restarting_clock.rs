@@ -1,6 +1,6 @@
 //! Clock of a source that restarts without notice: no datagram says that a new life has begun.
 
-use crate::messages::source_clock::SourceClock;
+use hexad_client::messages::source_clock::SourceClock;
 
 /// Time for which every stamp is refused, after which the source counts as restarted \[ns\]. Messages that were held up on the way
 /// arrive within less.

@@ -7,14 +7,14 @@ use std::thread::{sleep, spawn};
 use std::time::Duration;
 
 use crate::commands::request::carry_out_in_background;
-use crate::config::Config;
-use crate::control::signals::state::Request;
-use crate::daemon::target_source::{Feed, Observation, TargetError};
-use crate::messages::clock::monotonic_ns;
-use crate::operator::protocol::AnswerLine as Answer;
-use crate::operator::requests::status;
-use crate::operator::{OperatorError, Order};
-use crate::realtime::stop_request::Stop;
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::operator::protocol::AnswerLine as Answer;
+use hexad_client::operator::requests::{StopBaseline, status};
+use hexad_client::operator::{OperatorError, Order};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::signals::state::Request;
+use hexad_daemon::target_source::{Feed, Observation, TargetError};
+use hexad_machine::config::Config;
 
 /// Interval between two requests.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -33,6 +33,7 @@ pub struct StatusFeed {
     shared: Arc<Mutex<Watched>>,
     watched: Watched,
     machine: String,
+    baseline: StopBaseline,
     /// Longest wait for control; `None` once it was requested and decided.
     within: Option<Duration>,
     engagement: Option<Receiver<Result<(), OperatorError>>>,
@@ -57,7 +58,8 @@ impl StatusFeed {
                 sleep(INTERVAL);
             }
         });
-        Self { shared, watched, machine, within, engagement: None, stop: stop.clone() }
+        let baseline = StopBaseline::before(first);
+        Self { shared, watched, machine, baseline, within, engagement: None, stop: stop.clone() }
     }
 }
 
@@ -73,7 +75,8 @@ impl Feed for StatusFeed {
     fn request_control(&mut self) -> Result<(), TargetError> {
         let Some(timeout) = self.within else { return Ok(()) };
         let engagement = self.engagement.get_or_insert_with(|| {
-            let order = Order { request: Request::Engage, is_patient: true, timeout, remote: None };
+            let baseline = Some(self.baseline);
+            let order = Order { is_patient: true, baseline, ..Order::new(Request::Engage, timeout) };
             carry_out_in_background(&self.machine, order, &self.stop)
         });
         let Ok(outcome) = engagement.try_recv() else { return Ok(()) };

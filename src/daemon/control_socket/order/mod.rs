@@ -2,13 +2,17 @@
 
 use nalgebra::Vector3;
 
-use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::state::{Request, State};
-use crate::daemon::process_names::sentence;
-use crate::daemon::snapshot::Snapshot;
-use crate::messages::MAX_REQUEST_AGE_NS;
-use crate::operator::protocol::{AnswerLine, RequestResult, is_stop};
-use crate::realtime::request_word::RequestWord;
+use crate::control_socket::answer::answer_line;
+use crate::process_names::sentence;
+use crate::snapshot::Snapshot;
+use hexad_client::messages::MAX_REQUEST_AGE_NS;
+use hexad_client::operator::protocol::{AnswerLine, RequestResult, STOPPED, is_stop};
+use hexad_client::realtime::request_word::RequestWord;
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::state::{Request, State};
+
+/// Why a request has ended.
+pub const REPLACED: &str = "a later request has replaced it";
 
 /// Interval between two attempts of a request that waits until it is possible \[ns\].
 const RETRY_INTERVAL_NS: u64 = 100_000_000;
@@ -16,10 +20,17 @@ const RETRY_INTERVAL_NS: u64 = 100_000_000;
 /// Longest wait for the controller's answer \[ns\]. A request for control is not valid for longer.
 const ANSWER_LIMIT_NS: u64 = MAX_REQUEST_AGE_NS + 200_000_000;
 
+/// How often a request was posted that overrules this one: of those that end control, the ones of higher precedence.
+pub fn stop_count(word: &RequestWord, request: Request) -> u32 {
+    word.posts_above(request.max(Request::Clear) as u32)
+}
+
 /// Request of a client, with its options.
 #[derive(Clone, Copy, Debug)]
 pub struct Order {
     pub request: Request,
+    /// [`stop_count`] when it was asked for.
+    pub stops_before: u32,
     /// Whether the client is answered only when the request is completed.
     pub waits: bool,
     /// Whether to wait for missing measurements and setpoints instead of being refused.
@@ -32,8 +43,6 @@ pub struct Order {
 #[derive(Clone, Copy, Debug)]
 pub struct PendingOrder {
     order: Order,
-    /// Requests of higher precedence that were posted before it.
-    posts_above: u32,
     stage: Stage,
     /// Beginning of the stage \[ns\].
     since_ns: u64,
@@ -69,9 +78,8 @@ pub enum Step {
 impl PendingOrder {
     /// Creates an order and posts it at once, unless a request of higher precedence is pending.
     pub fn post(order: Order, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Self {
-        let posts_above = word.posts_above(order.request as u32);
         let reported = DiagnosticCode::None;
-        let mut pending = Self { order, posts_above, stage: Stage::Posting, since_ns: now_ns, reported };
+        let mut pending = Self { order, stage: Stage::Posting, since_ns: now_ns, reported };
         pending.try_post(snapshot, word, now_ns);
         pending
     }
@@ -90,7 +98,7 @@ impl PendingOrder {
             }
             // Whoever stops a platform has also stopped what waits to move it.
             Stage::Posting | Stage::Retrying if self.is_overruled(word) => {
-                return Step::Answer(self.superseded(snapshot));
+                return self.answer(RequestResult::Superseded, snapshot, STOPPED.into());
             }
             Stage::Posting => self.try_post(snapshot, word, now_ns),
             Stage::Retrying if age_ns > RETRY_INTERVAL_NS => self.try_post(snapshot, word, now_ns),
@@ -100,7 +108,8 @@ impl PendingOrder {
                 return self.replaced(snapshot, now_ns);
             }
             Stage::Posted(posted) if word.load() != posted => {
-                return Step::Answer(self.superseded(snapshot));
+                let text = if self.is_overruled(word) { STOPPED } else { REPLACED };
+                return self.answer(RequestResult::Superseded, snapshot, text.into());
             }
             Stage::Posted(posted) if age_ns > ANSWER_LIMIT_NS => {
                 self.cancel_posted(posted, word);
@@ -122,12 +131,7 @@ impl PendingOrder {
 
     /// Answer to the client whose order a later request replaces.
     pub fn superseded(&self, snapshot: &Snapshot) -> AnswerLine {
-        self.line(
-            RequestResult::Superseded,
-            snapshot,
-            diagnostic(snapshot),
-            "a later request has replaced it".into(),
-        )
+        self.line(RequestResult::Superseded, snapshot, diagnostic(snapshot), REPLACED.into())
     }
 
     /// Tries to post the request. Before the first cycle is published, no request for control is posted.
@@ -135,15 +139,16 @@ impl PendingOrder {
         if snapshot.time_ns == 0 && self.order.request.can_begin_control() {
             return;
         }
-        if let Some(posted) = word.post(self.order.request as u32, now_ns) {
+        let posted = word.post_unless(self.order.request as u32, now_ns, || self.is_overruled(word));
+        if let Some(posted) = posted {
             (self.stage, self.since_ns) = (Stage::Posted(posted), now_ns);
         }
     }
 
-    /// Whether a request of higher precedence was posted meanwhile.
+    /// Whether a request that ends control was posted since it was asked for.
     fn is_overruled(&self, word: &RequestWord) -> bool {
-        let request = self.order.request;
-        !is_stop(request) && self.posts_above != word.posts_above(request as u32)
+        let Order { request, stops_before, .. } = self.order;
+        !is_stop(request) && stops_before != stop_count(word, request)
     }
 
     fn cancel_posted(&self, posted: u64, word: &RequestWord) {
@@ -224,7 +229,7 @@ impl PendingOrder {
         diagnostic: Diagnostic,
         text: String,
     ) -> AnswerLine {
-        AnswerLine::new(result, self.order.request, state(snapshot), diagnostic, text)
+        answer_line(result, self.order.request.name(), state(snapshot), &diagnostic, text)
     }
 }
 
@@ -248,7 +253,8 @@ fn outcome(request: Request, state: State) -> Option<bool> {
 fn may_resolve(code: DiagnosticCode) -> bool {
     use DiagnosticCode::{MeasurementLost, MeasurementStampInvalid, SetpointLost, SetpointStampInvalid};
     let may_return = [MeasurementLost, MeasurementStampInvalid, SetpointLost, SetpointStampInvalid];
-    !code.is_fault() || may_return.contains(&code)
+    // Only an operator or an external pose selects the assembly mode.
+    !code.is_fault() && code != DiagnosticCode::OtherPoses || may_return.contains(&code)
 }
 
 fn state(snapshot: &Snapshot) -> State {

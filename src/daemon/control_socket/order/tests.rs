@@ -2,8 +2,17 @@
 
 use super::*;
 
-fn order(request: Request, is_patient: bool) -> Order {
-    Order { request, waits: true, is_patient, deadline_ns: u64::MAX }
+/// An order that is asked for now.
+fn post(
+    request: Request,
+    is_patient: bool,
+    snapshot: &Snapshot,
+    word: &RequestWord,
+    now_ns: u64,
+) -> PendingOrder {
+    let stops_before = stop_count(word, request);
+    let order = Order { request, stops_before, waits: true, is_patient, deadline_ns: u64::MAX };
+    PendingOrder::post(order, snapshot, word, now_ns)
 }
 
 fn snapshot(state: State, answered: u64, refusal: Diagnostic) -> Snapshot {
@@ -20,7 +29,7 @@ fn first_cycle() -> Snapshot {
 fn no_control_begins_before_the_first_cycle_and_a_stop_is_posted_at_once() {
     for request in Request::ALL {
         let word = RequestWord::default();
-        let mut pending = PendingOrder::post(order(request, true), &Snapshot::default(), &word, 1000);
+        let mut pending = post(request, true, &Snapshot::default(), &word, 1000);
         assert_eq!(word.load() == 0, request.can_begin_control(), "{request:?}");
         pending.step(&first_cycle(), &word, 2000);
         assert_ne!(word.load(), 0);
@@ -37,7 +46,7 @@ fn result(step: &Step) -> Option<RequestResult> {
 #[test]
 fn an_engage_is_accepted_and_then_done() {
     let word = RequestWord::default();
-    let mut pending = PendingOrder::post(order(Request::Engage, false), &first_cycle(), &word, 1000);
+    let mut pending = post(Request::Engage, false, &first_cycle(), &word, 1000);
     let posted = word.load();
     let none = Diagnostic::default();
     assert_eq!(result(&pending.step(&snapshot(State::Standby, 0, none), &word, 2000)), None);
@@ -51,12 +60,12 @@ fn an_engage_is_accepted_and_then_done() {
 #[test]
 fn a_stop_of_another_supersedes_an_engage_and_does_not_wait_for_it() {
     let word = RequestWord::default();
-    let mut engage = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 1000);
-    let _estop = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 2000);
+    let mut engage = post(Request::Engage, true, &first_cycle(), &word, 1000);
+    let _estop = post(Request::Estop, false, &first_cycle(), &word, 2000);
     let step = engage.step(&snapshot(State::Standby, 0, Diagnostic::default()), &word, 3000);
     assert_eq!(result(&step), Some(RequestResult::Superseded));
     engage.cancel(&word);
-    assert_eq!(crate::realtime::request_word::number(word.load()), Request::Estop as u32);
+    assert_eq!(hexad_client::realtime::request_word::number(word.load()), Request::Estop as u32);
 }
 
 #[test]
@@ -67,30 +76,27 @@ fn a_stop_that_another_replaces_ends_with_whether_the_platform_is_stopped() {
         (Request::Clear, State::Off, RequestResult::Failed),
     ] {
         let word = RequestWord::default();
-        let mut first = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 1000);
+        let mut first = post(Request::Estop, false, &first_cycle(), &word, 1000);
         // The loop has read the word. Before the order is checked, a later request is posted and answered.
         word.set_seen(word.load());
-        let _later = PendingOrder::post(order(later, false), &first_cycle(), &word, 2000);
+        let _later = post(later, false, &first_cycle(), &word, 2000);
         let step = first.step(&snapshot(state, word.load(), none), &word, 3000);
         assert_eq!(result(&step), Some(expected), "{later:?}");
     }
     // An emergency stop replaces a stop that the loop has not read.
     let word = RequestWord::default();
-    let mut stop = PendingOrder::post(order(Request::Stop, false), &first_cycle(), &word, 1000);
-    let _estop = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 2000);
+    let mut stop = post(Request::Stop, false, &first_cycle(), &word, 1000);
+    let _estop = post(Request::Estop, false, &first_cycle(), &word, 2000);
     assert_eq!(result(&stop.step(&snapshot(State::Active, 0, none), &word, 3000)), None, "on its way");
     let step = stop.step(&snapshot(State::Fault, word.load(), none), &word, 4000);
-    assert!(
-        matches!(&step, Step::Answer(line) if line.result == RequestResult::Failed && line.state == "fault"),
-        "{step:?}"
-    );
+    assert!(matches!(&step, Step::Answer(it) if it.result == RequestResult::Failed && it.state == "fault"));
 }
 
 #[test]
 fn what_the_loop_does_not_answer_is_withdrawn_unless_it_stops() {
     for request in Request::ALL {
         let word = RequestWord::default();
-        let mut pending = PendingOrder::post(order(request, false), &first_cycle(), &word, 1000);
+        let mut pending = post(request, false, &first_cycle(), &word, 1000);
         let held = snapshot(State::Active, 0, Diagnostic::default());
         assert_eq!(result(&pending.step(&held, &word, ANSWER_LIMIT_NS)), None);
         let step = pending.step(&held, &word, ANSWER_LIMIT_NS + 1001);
@@ -104,18 +110,18 @@ fn what_the_loop_does_not_answer_is_withdrawn_unless_it_stops() {
 fn a_stop_of_another_ends_an_order_that_waits() {
     for stop in [Request::Park, Request::Stop, Request::Off, Request::Estop] {
         let word = RequestWord::default();
-        let mut waits = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
+        let mut waits = post(Request::Engage, true, &first_cycle(), &word, 0);
         let refused = snapshot(State::Standby, word.load(), DiagnosticCode::NoSetpoint.into());
         assert_eq!(result(&waits.step(&refused, &word, 1000)), Some(RequestResult::Waiting));
         word.set_seen(word.load());
         for later in [stop, Request::Engage] {
-            PendingOrder::post(order(later, false), &first_cycle(), &word, 2000);
+            post(later, false, &first_cycle(), &word, 2000);
             word.set_seen(word.load());
         }
         let last = word.load();
         assert_eq!(result(&waits.step(&refused, &word, 3000)), Some(RequestResult::Superseded), "{stop:?}");
         assert_eq!(word.load(), last, "nothing is posted");
-        let mut new = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 4000);
+        let mut new = post(Request::Engage, true, &first_cycle(), &word, 4000);
         assert_eq!(result(&new.step(&refused, &word, 5000)), None, "an order after the stop counts");
     }
 }
@@ -123,7 +129,7 @@ fn a_stop_of_another_ends_an_order_that_waits() {
 #[test]
 fn a_patient_order_says_once_why_it_waits_and_tries_again() {
     let word = RequestWord::default();
-    let mut pending = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
+    let mut pending = post(Request::Engage, true, &first_cycle(), &word, 0);
     let first = word.load();
     let refused = snapshot(State::Standby, first, DiagnosticCode::NoSetpoint.into());
     let step = pending.step(&refused, &word, 1000);
@@ -144,6 +150,6 @@ fn a_patient_order_says_once_why_it_waits_and_tries_again() {
     let step = pending.step(&old, &word, 2 * RETRY_INTERVAL_NS + 5000);
     assert_eq!(result(&step), Some(RequestResult::Waiting), "{step:?}");
     let fault = snapshot(State::Fault, word.load(), DiagnosticCode::InvalidInState.into());
-    let mut impatient = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
+    let mut impatient = post(Request::Engage, true, &first_cycle(), &word, 0);
     assert_eq!(result(&impatient.step(&fault, &word, 1)), Some(RequestResult::Refused));
 }

@@ -1,0 +1,213 @@
+//! Requests to one daemon: the first that counts, in the order service, this user, root.
+
+use std::io;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use super::connection::{Attempt, Connection};
+use super::endpoint::{Endpoint, endpoints};
+use super::exchange::converse;
+use super::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use super::status_report::StopNumber;
+use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
+use crate::messages::MAX_REQUEST_AGE_NS;
+use hexad_core::control::signals::state::Request;
+
+/// Longest wait for the first line of the daemon: longer than the daemon waits for its loop.
+const FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
+
+/// Longest wait of a patient request for a daemon that is about to start.
+const DAEMON_START_LIMIT: Duration = Duration::from_secs(2);
+
+/// Sends a request other than a stop, and waits for its result: the name of the resulting state. `waits`
+/// receives the reasons for waiting, each once. A patient request also waits for a daemon that is about to
+/// start.
+pub fn carry_out(
+    machine: &str,
+    order: &Order,
+    interrupted: &(dyn Fn() -> bool + Sync),
+    mut waits: impl FnMut(&str),
+) -> Result<String, OperatorError> {
+    let began = Instant::now();
+    let can_begin = order.request.can_begin_control();
+    let mut baseline = can_begin.then(|| order.baseline.unwrap_or_else(|| StopBaseline::now(machine)));
+    loop {
+        let stops = baseline.as_mut().and_then(|baseline| baseline.number(machine));
+        let line = RequestLine { stops, ..order.line() };
+        let outcome = attempt(machine, order, &line, interrupted, &mut waits);
+        let limit = match &outcome {
+            Err(OperatorError::NoDaemon(_)) if order.is_patient => DAEMON_START_LIMIT.min(order.timeout),
+            // Repeats only while this command's own request is not too old.
+            Err(OperatorError::Stale(..)) => Duration::from_nanos(MAX_REQUEST_AGE_NS),
+            _ => return outcome,
+        };
+        if began.elapsed() > limit || interrupted() {
+            return outcome;
+        }
+        sleep(RETRY_INTERVAL);
+    }
+}
+
+fn attempt(
+    machine: &str,
+    order: &Order,
+    line: &RequestLine,
+    interrupted: &dyn Fn() -> bool,
+    waits: &mut impl FnMut(&str),
+) -> Result<String, OperatorError> {
+    let ask = |connection: &mut Connection| {
+        let until = Instant::now() + FIRST_LINE_LIMIT;
+        converse(connection, line, until, order.timeout, interrupted, &mut *waits)
+    };
+    match ask_first(machine, ask) {
+        Ok(answer) => order.conclude(answer),
+        Err(_) if interrupted() => Err(OperatorError::Interrupted),
+        Err(OperatorError::NoAnswer(reason)) => Err(OperatorError::NotConfirmed(order.request, reason)),
+        Err(error) => Err(error),
+    }
+}
+
+/// The status of the daemon of a machine.
+pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
+    first_answer(machine, status_of)
+}
+
+/// The status of the daemon that listens at an endpoint.
+pub fn status_of(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+    ask_at(endpoint, Endpoint::connect_to_read, |mut connection| {
+        let until = Instant::now() + FIRST_LINE_LIMIT;
+        converse(&mut connection, &RequestLine::new("status"), until, FIRST_LINE_LIMIT, || false, |_| ())
+    })
+}
+
+/// Requests a reload of the machine file. Returns the changes as text.
+pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError> {
+    let line = RequestLine { progress: true, ..RequestLine::new("reload") };
+    let answer = ask_first(machine, |connection| {
+        converse(connection, &line, Instant::now() + FIRST_LINE_LIMIT, timeout, || false, |_| ())
+    });
+    match answer {
+        Ok(AnswerLine { result: RequestResult::Done, text, .. }) => Ok(text),
+        Ok(AnswerLine { result: RequestResult::Unanswered, text, .. })
+        | Err(OperatorError::NoAnswer(text)) => Err(OperatorError::ReloadNotConfirmed(text)),
+        Ok(AnswerLine { text, .. }) => Err(OperatorError::ReloadRefused(text)),
+        Err(error) => Err(error),
+    }
+}
+
+/// Connects to the first daemon that counts.
+pub fn connect(machine: &str) -> Result<Connection, OperatorError> {
+    first_answer(machine, |endpoint| ask_at(endpoint, Endpoint::connect, |connection| Ok(Some(connection))))
+}
+
+/// The answer of the first daemon that counts. `ask` sends a request over a connection.
+pub fn ask_first(
+    machine: &str,
+    mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
+) -> Result<AnswerLine, OperatorError> {
+    first_answer(machine, |endpoint| {
+        ask_at(endpoint, Endpoint::connect, |mut connection| ask(&mut connection))
+    })
+}
+
+fn first_answer<T>(
+    machine: &str,
+    mut ask: impl FnMut(&Endpoint) -> Result<T, OperatorError>,
+) -> Result<T, OperatorError> {
+    let mut failure = OperatorError::NoDaemon(machine.into());
+    for endpoint in endpoints(Some(machine)) {
+        match ask(&endpoint) {
+            Err(OperatorError::NoDaemon(_)) => {}
+            // Another daemon may admit this user, or count.
+            Err(error @ (OperatorError::Forbidden { .. } | OperatorError::NotTrusted { .. })) => {
+                if matches!(failure, OperatorError::NoDaemon(_)) {
+                    failure = error;
+                }
+            }
+            answer => return answer,
+        }
+    }
+    Err(failure)
+}
+
+fn ask_at<T>(
+    endpoint: &Endpoint,
+    connect: impl Fn(&Endpoint) -> io::Result<Attempt>,
+    mut ask: impl FnMut(Connection) -> io::Result<Option<T>>,
+) -> Result<T, OperatorError> {
+    let mut reason = "it accepts nobody".to_owned();
+    for _ in 0..ATTEMPTS {
+        match connect(endpoint) {
+            Ok(Attempt::Connected(connection)) if !endpoint.counts(&connection) => {
+                return Err(Stranger::at(endpoint, &connection, "nothing was sent").error("the request"));
+            }
+            Ok(Attempt::Connected(connection)) => match ask(connection) {
+                Ok(Some(answer)) => return Ok(answer),
+                Ok(None) => {
+                    reason = "is it stopped, or its log blocked?".into();
+                    break;
+                }
+                // The daemon has closed it, as it does if too many clients connect.
+                Err(error) => reason = error.to_string(),
+            },
+            Ok(Attempt::Full) => sleep(RETRY_INTERVAL),
+            Ok(Attempt::Forbidden) => return Err(OperatorError::forbidden_at(endpoint)),
+            Ok(Attempt::Absent) | Err(_) if endpoint.daemon.is_some() => break,
+            Ok(Attempt::Absent) | Err(_) => return Err(OperatorError::NoDaemon(endpoint.machine.clone())),
+        }
+    }
+    if !endpoint.is_trusted {
+        return Err(OperatorError::NoDaemon(endpoint.machine.clone()));
+    }
+    let process =
+        endpoint.daemon.as_ref().map_or("the daemon".into(), |it| format!("process {}", it.process_id));
+    Err(OperatorError::NoAnswer(format!(
+        "{process} does not answer at {}: {reason}",
+        endpoint.socket.display()
+    )))
+}
+
+/// When a person asked for control: the number of stops of the daemon that ran then; of none that ran, the number of a daemon that has
+/// just begun. It is taken once, and no retry or wait takes a newer one. The daemon refuses what was asked for before the last stop, so
+/// that nothing that still waits somewhere moves a platform that somebody has stopped.
+#[derive(Clone, Copy, Debug)]
+pub struct StopBaseline(Option<StopNumber>);
+
+impl StopBaseline {
+    /// Of a request that a person makes now.
+    pub fn now(machine: &str) -> Self {
+        Self(stop_number(machine))
+    }
+
+    /// Of a request that a person has made just before this answer to `status`.
+    pub fn before(answer: &AnswerLine) -> Self {
+        Self(stop_number_of(answer))
+    }
+
+    /// The number for the line of a request. `None` if no daemon runs, or an older one.
+    fn number(&mut self, machine: &str) -> Option<StopNumber> {
+        if self.0.is_none() {
+            self.0 = stop_number(machine).map(|begun| StopNumber { count: 0, ..begun });
+        }
+        self.0
+    }
+
+    /// An error if a stop has come since.
+    pub fn check(&mut self, machine: &str) -> Result<(), OperatorError> {
+        let baseline = self.number(machine);
+        match stop_number(machine) {
+            Some(now) if baseline != Some(now) => {
+                Err(OperatorError::NotCompleted(Request::Engage, STOPPED.into()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn stop_number(machine: &str) -> Option<StopNumber> {
+    stop_number_of(&status(machine).ok()?)
+}
+
+fn stop_number_of(answer: &AnswerLine) -> Option<StopNumber> {
+    answer.status.as_ref()?.stops
+}

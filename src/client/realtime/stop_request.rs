@@ -1,0 +1,84 @@
+//! Requests to stop by signal (SIGINT, SIGTERM, SIGHUP), counted.
+
+use core::ffi::c_int;
+use core::ptr;
+use core::sync::atomic::{AtomicU32, Ordering};
+use core::time::Duration;
+use std::io;
+use std::sync::Arc;
+use std::thread;
+
+/// Stop request of this process: a count of its signals.
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<AtomicU32>);
+
+impl Stop {
+    /// Installs the handler. Once per process.
+    pub fn on_signals() -> Result<Self, ctrlc::Error> {
+        let stop = Self::default();
+        let flag = stop.clone();
+        let main = thread::current();
+        ctrlc::set_handler(move || {
+            flag.0.fetch_add(1, Ordering::Relaxed);
+            main.unpark();
+        })?;
+        Ok(stop)
+    }
+
+    /// Requests the end, as a signal does.
+    pub fn request(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Whether a signal has arrived.
+    pub fn is_requested(&self) -> bool {
+        self.0.load(Ordering::Relaxed) > 0
+    }
+
+    /// Whether more than one signal has arrived: the process then ends at once instead of in order.
+    pub fn is_repeated(&self) -> bool {
+        self.0.load(Ordering::Relaxed) > 1
+    }
+
+    /// Sleeps for a time or until a signal arrives; for the thread that called [`Stop::on_signals`].
+    pub fn wait(&self, time: Duration) {
+        if !self.is_requested() {
+            thread::park_timeout(time);
+        }
+    }
+}
+
+/// SIGHUPs of this process since [`Hangups::count`].
+static HANGUPS: AtomicU32 = AtomicU32::new(0);
+
+/// SIGHUPs, counted instead of a request to stop.
+#[derive(Debug)]
+pub struct Hangups {
+    seen: u32,
+}
+
+impl Hangups {
+    /// Counts SIGHUP from now on; it replaces what [`Stop::on_signals`] has installed.
+    pub fn count() -> io::Result<Self> {
+        // SAFETY: an all-zero `sigaction` is valid and is filled before use. The handler adds to an atomic number, which may be
+        // done in one. A null pointer for the old action is allowed.
+        let result = unsafe {
+            let mut action: libc::sigaction = core::mem::zeroed();
+            action.sa_sigaction = count_hangup as extern "C" fn(c_int) as libc::sighandler_t;
+            action.sa_flags = libc::SA_RESTART;
+            libc::sigemptyset(&mut action.sa_mask);
+            libc::sigaction(libc::SIGHUP, &action, ptr::null_mut())
+        };
+        if result == 0 { Ok(Self { seen: 0 }) } else { Err(io::Error::last_os_error()) }
+    }
+
+    /// Whether one has arrived since the last call.
+    pub fn has_new(&mut self) -> bool {
+        let count = HANGUPS.load(Ordering::Relaxed);
+        core::mem::replace(&mut self.seen, count) != count
+    }
+}
+
+extern "C" fn count_hangup(_: c_int) {
+    HANGUPS.fetch_add(1, Ordering::Relaxed);
+}

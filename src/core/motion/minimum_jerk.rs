@@ -1,0 +1,120 @@
+//! The minimum-jerk profile `s(u) = 10 u^3 - 15 u^4 + 6 u^5`, `u = t / T` in \[0, 1\]: from rest to rest without a step
+//! in acceleration.
+//!
+//! Source: Flash and Hogan (1985), "The coordination of arm movements". Its jerk has steps at both ends.
+
+#[cfg(not(feature = "std"))]
+use nalgebra::ComplexField as _;
+use nalgebra::Vector6;
+
+use crate::model::task::TaskState;
+
+/// Peak of s' for a unit duration: peak velocity of a move over its mean.
+pub const PEAK_RATE: f64 = 1.875;
+
+/// Peaks of the second and third derivative of s for a unit duration: 10 / sqrt 3, and 60 at both ends.
+const PEAK_ACCEL: f64 = 5.773502691896258;
+const PEAK_JERK: f64 = 60.0;
+
+/// Shortest duration \[s\] of a minimum-jerk move of length `distance` within limits of velocity, acceleration and jerk.
+///
+/// ```
+/// use hexad_core::motion::minimum_jerk::{PEAK_RATE, shortest_duration};
+/// // 0.3 m at 0.1 m/s at most, other limits far: 1.875 times as long as at constant velocity.
+/// let duration = shortest_duration(0.3, [0.1, 1e9, 1e9]);
+/// assert!((duration - PEAK_RATE * 0.3 / 0.1).abs() < 1e-12);
+/// ```
+pub fn shortest_duration(distance: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
+    let by_rate = PEAK_RATE * distance / velocity;
+    by_rate.max((PEAK_ACCEL * distance / acceleration).sqrt()).max((PEAK_JERK * distance / jerk).cbrt())
+}
+
+/// Value of a profile and its first two time derivatives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// s
+    pub value: f64,
+    /// s' \[1/s\]
+    pub rate: f64,
+    /// s'' \[1/s^2\]
+    pub accel: f64,
+}
+
+/// The profile from 0 at `t = 0` to 1 at `t = duration`; constant outside.
+///
+/// ```
+/// use hexad_core::motion::minimum_jerk::{Profile, rise};
+/// assert_eq!(rise(0.0, 2.0), Profile::default());
+/// assert_eq!(rise(2.0, 2.0), Profile { value: 1.0, ..Profile::default() });
+/// // Symmetric: halfway at half the time, fastest there, and no acceleration.
+/// assert_eq!(rise(1.0, 2.0), Profile { value: 0.5, rate: 1.875 / 2.0, accel: 0.0 });
+/// ```
+pub fn rise(t: f64, duration: f64) -> Profile {
+    let u = t / duration;
+    if !(u > 0.0) {
+        return Profile::default();
+    }
+    if u >= 1.0 {
+        return Profile { value: 1.0, ..Profile::default() };
+    }
+    Profile {
+        value: u * u * u * (10.0 + u * (-15.0 + u * 6.0)),
+        rate: u * u * (30.0 + u * (-60.0 + u * 30.0)) / duration,
+        accel: u * (60.0 + u * (-180.0 + u * 120.0)) / (duration * duration),
+    }
+}
+
+/// Rises during the first `fade` seconds, is 1, and falls during the last `fade` seconds before `end`.
+pub fn window(t: f64, end: f64, fade: f64) -> Profile {
+    let (up, down) = (rise(t, fade), rise(t - (end - fade), fade));
+    Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel }
+}
+
+/// The straight move in task coordinates along this profile.
+pub fn straight_move(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
+    let change = to - from;
+    TaskState { x: from + change * s.value, xd: change * s.rate, xdd: change * s.accel }
+}
+
+/// `s(t) d(t)` with both derivatives, by the product rule.
+pub fn scaled_by_profile(d: &TaskState, s: &Profile) -> TaskState {
+    TaskState {
+        x: d.x * s.value,
+        xd: d.xd * s.value + d.x * s.rate,
+        xdd: d.xdd * s.value + d.xd * (2.0 * s.rate) + d.x * s.accel,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_belong_to_the_value_and_ends_are_at_rest() {
+        let h = 1e-5;
+        for k in 0..=100 {
+            let t = -0.5 + 0.04 * f64::from(k);
+            let (a, b, c) = (window(t - h, 3.0, 0.8), window(t, 3.0, 0.8), window(t + h, 3.0, 0.8));
+            assert!(((c.value - a.value) / (2.0 * h) - b.rate).abs() < 1e-8);
+            assert!(((c.rate - a.rate) / (2.0 * h) - b.accel).abs() < 1e-3);
+        }
+        assert_eq!(window(0.0, 3.0, 0.8), Profile::default());
+        let end = window(3.0, 3.0, 0.8);
+        assert!(end.value.abs() < 1e-15 && end.rate.abs() < 1e-12 && end.accel.abs() < 1e-12, "{end:?}");
+        assert_eq!(rise(0.5, 1.0).rate, PEAK_RATE);
+        let strongest = (0..=1000).map(|k| rise(f64::from(k) / 1000.0, 1.0).accel).fold(0.0, f64::max);
+        assert!((strongest - PEAK_ACCEL).abs() < 1e-4);
+        assert!((rise(1e-6, 1.0).accel / 1e-6 - PEAK_JERK).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_shortest_duration_is_that_of_the_limit_that_binds() {
+        let way = 0.3;
+        for limits in [[0.1, 1e9, 1e9], [1e9, 0.1, 1e9], [1e9, 1e9, 0.1]] {
+            let t = shortest_duration(way, limits);
+            let peaks = [PEAK_RATE * way / t, PEAK_ACCEL * way / (t * t), PEAK_JERK * way / (t * t * t)];
+            let share = peaks.iter().zip(limits).map(|(peak, limit)| peak / limit).fold(0.0, f64::max);
+            assert!((share - 1.0).abs() < 1e-12, "{share}");
+        }
+    }
+}

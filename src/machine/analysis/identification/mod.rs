@@ -1,0 +1,200 @@
+//! Identification: masses, inertias, friction and force scales of a machine, from recorded motions.
+//!
+//! | step | file |
+//! | --- | --- |
+//! | motion and commands of a recording at the same instants, smoothed alike | [`mod@samples`] |
+//! | equations, linear in parameters and force scales, and their QR decomposition | `equations` |
+//! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
+//! | most probable parameters, their deviations | `fit` |
+//! | base parameters by the equations alone | `least_squares` |
+//!
+//! Equations alone do not distinguish all parameters, see [`hexad_core::model::regressor`]: what they leave open stays as the file
+//! has it. Without a known weight on the platform in one of the recordings no motion distinguishes the mean of the force
+//! scales from all masses and friction: then the mean stays as it is.
+
+use nalgebra::DVector;
+
+use self::equations::{Equation, GROUP, SCALE, equations};
+use self::fit::{Fit, fit};
+use self::least_squares::least_squares;
+use self::parameters::{Bodies, FREE, Free, Parameters};
+use crate::analysis::excitation_design::base_values;
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::{Machine, Platform};
+use hexad_core::model::regressor::InertialParameters;
+
+mod equations;
+mod fit;
+mod least_squares;
+mod parameters;
+pub mod samples;
+
+pub use self::equations::Load;
+pub use self::samples::{MotionSample, samples};
+
+/// Samples of one recording, and what was on the platform.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Samples.
+    pub samples: Vec<MotionSample>,
+    /// Body on the platform.
+    pub load: Load,
+}
+
+/// Identified machine.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// The machine, without the known weights and without the payload.
+    pub machine: Machine,
+    /// The payload; meaningless if no run had one.
+    pub payload: Platform,
+    /// Equations that were used.
+    pub equations: usize,
+    /// Number of combinations of parameters that the equations show better than they were known before, and of the others.
+    pub shown: usize,
+    /// See above.
+    pub unknown: usize,
+    /// RMS of what is left of the force of each leg \[N\].
+    pub residual: [f64; LEGS],
+    /// Correlation of successive residuals of each leg: 0 for white noise.
+    pub correlation: [f64; LEGS],
+    /// Base parameters by least squares of the equations alone, without prior: pairs of an index and a value. Indices count
+    /// the parameters of the [regressor](hexad_core::model::regressor), then six force scales, six products of force scale and load friction, and the
+    /// parameters of the payload. `None` without a known weight, or if the equations do not determine them.
+    pub base_parameters: Option<Vec<(usize, f64)>>,
+    parameters: Parameters,
+    fit: Fit,
+}
+
+/// A value and its standard deviation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimated {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Value of the file, and the deviation that was expected of it.
+    pub before: f64,
+    /// See above.
+    pub expected: f64,
+}
+
+/// Identifies a machine from runs; `None` if they do not have enough equations. With `holds_machine` only the payload is
+/// identified.
+pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Identification> {
+    let mut parameters = Parameters::new(file);
+    if holds_machine {
+        parameters.hold_machine();
+    }
+    let all: Vec<Equation> = runs.iter().flat_map(|run| equations(file, &run.samples, &run.load)).collect();
+    let has_known_weight = runs.iter().any(|run| matches!(run.load, Load::Known { .. }));
+    let is_scale_known = holds_machine || has_known_weight;
+    let fit = fit(&parameters, &all, file.actuator.max_force, is_scale_known)?;
+    let Bodies { machine, payload } = parameters.bodies(&fit.free);
+    let Fit { shown, unknown, residual, correlation, .. } = fit;
+    Some(Identification {
+        machine,
+        payload,
+        equations: all.len(),
+        shown,
+        unknown,
+        residual,
+        correlation,
+        base_parameters: least_squares(file, &all).filter(|_| has_known_weight),
+        parameters,
+        fit,
+    })
+}
+
+/// How far a machine may be from its file before anything is recorded: standard deviations of its base parameters, see
+/// [`base_values`].
+pub fn expected_deviations(file: &Machine) -> InertialParameters {
+    let parameters = Parameters::new(file);
+    let at = |free: &Free| base_values(&parameters.bodies(free).machine);
+    let mut squares = InertialParameters::zeros();
+    for (index, deviation) in parameters.deviation.iter().enumerate() {
+        let step = Free::from_fn(|row, _| if row == index { DIFFERENCE * deviation } else { 0.0 });
+        let change = at(&(parameters.prior + step)) - at(&(parameters.prior - step));
+        squares += (change / (2.0 * DIFFERENCE)).map(|change| change * change);
+    }
+    squares.map(f64::sqrt)
+}
+
+impl Identification {
+    /// A quantity of machine and payload with its deviation.
+    pub fn estimate(&self, quantity: impl Fn(&Machine, &Platform) -> f64) -> Estimated {
+        let Self { parameters, fit: Fit { free, covariance, .. }, .. } = self;
+        let at = |free: &Free| {
+            let Bodies { machine, payload } = parameters.bodies(free);
+            quantity(&machine, &payload)
+        };
+        let gradient = DVector::from_fn(FREE, |index, _| {
+            let step = Free::from_fn(|row, _| {
+                if row == index { DIFFERENCE * parameters.deviation.row(index).x } else { 0.0 }
+            });
+            (at(&(free + step)) - at(&(free - step))) / (2.0 * DIFFERENCE * parameters.deviation.row(index).x)
+        });
+        let scaled =
+            gradient.component_mul(&DVector::from_iterator(FREE, parameters.deviation.iter().copied()));
+        Estimated {
+            value: at(free),
+            deviation: gradient.dot(&(covariance * &gradient)).max(0.0).sqrt(),
+            before: at(&parameters.prior),
+            expected: scaled.norm(),
+        }
+    }
+}
+
+/// Step of differences, over the deviation of a parameter.
+const DIFFERENCE: f64 = 1e-4;
+
+impl Run {
+    /// Time from the first to the last sample \[s\].
+    pub fn duration_s(&self) -> f64 {
+        self.samples.first().zip(self.samples.last()).map_or(0.0, |(first, last)| last.time_s - first.time_s)
+    }
+
+    /// Time of which a prediction is the mean \[s\].
+    pub fn group_s(&self) -> f64 {
+        let steps = self.samples.iter().zip(self.samples.iter().skip(1)).map(|(a, b)| b.time_s - a.time_s);
+        GROUP as f64 * steps.fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Command of a leg in a run, mean of a group of samples, and what a machine does not explain of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Prediction {
+    /// Leg.
+    pub leg: usize,
+    /// First instant of the group, since the first release of the stretch \[s\].
+    pub time_s: f64,
+    /// Recorded command \[N\].
+    pub command: f64,
+    /// Recorded command less the machine's \[N\].
+    pub residual: f64,
+}
+
+/// Predictions of the commands of a run. A leg that nearly stands has none.
+pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
+    let parameters = Parameters::new(machine);
+    let unknowns = parameters.unknowns(&parameters.prior);
+    let prediction = |equation: Equation| {
+        let command = equation.coefficients.row(SCALE + equation.leg).x;
+        let residual = fit::residual(&equation, &unknowns);
+        Prediction { leg: equation.leg, time_s: equation.time_s, command, residual }
+    };
+    equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
+}
+
+/// RMS and largest part of the commands of each leg \[N\] in runs that a machine does not explain; NaN for a leg that nearly
+/// stands.
+pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
+    let mut errors = [(0.0, f64::NAN, 0_u32); LEGS];
+    for Prediction { leg, residual, .. } in runs.iter().flat_map(|run| predictions(machine, run)) {
+        if let Some((squares, largest, count)) = errors.get_mut(leg) {
+            (*squares, *largest, *count) =
+                (*squares + residual * residual, largest.max(residual.abs()), *count + 1);
+        }
+    }
+    errors.map(|(squares, largest, count)| [(squares / f64::from(count)).sqrt(), largest])
+}

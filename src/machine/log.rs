@@ -1,0 +1,136 @@
+//! Log of the process: to the journal with fields if standard error is the journal, else as text, or as JSON.
+//! A thread of its own writes it, so that a log that blocks holds nobody.
+
+use std::fs::metadata;
+use std::io::{IsTerminal, Write};
+use std::os::unix::fs::MetadataExt;
+use std::sync::OnceLock;
+use std::{env, io};
+
+mod journal;
+mod outlet;
+
+use clap::ValueEnum;
+use tracing::{Level, Subscriber};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::fmt::format::debug_fn;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{Layer, Registry, fmt, registry};
+
+use self::outlet::Lines;
+pub use self::outlet::Log;
+
+/// Fields that the text of a message already contains.
+const FIELDS_IN_TEXT: [&str; 3] = ["state", "value", "bound"];
+
+/// Environment variable of [`LogFormat`], which child processes inherit.
+pub const FORMAT_VARIABLE: &str = "HEXAD_LOG_FORMAT";
+
+/// Environment variables with the filter. The first that is set counts.
+pub const FILTER_VARIABLES: [&str; 2] = ["HEXAD_LOG", "RUST_LOG"];
+
+/// Format of the log on standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// Text; to the journal with fields where standard error is the journal.
+    #[default]
+    Text,
+    /// A JSON object per line: `timestamp`, `level`, `message`, `target` and the fields.
+    Json,
+}
+
+/// Format of this process.
+static FORMAT: OnceLock<LogFormat> = OnceLock::new();
+
+/// Installs the log of this process, with the filter of `HEXAD_LOG` or `RUST_LOG`, as `debug` or `info,hexad_daemon=debug`.
+pub fn install(format: LogFormat) -> Log {
+    let (filter, warning) = filter(Targets::new().with_default(LevelFilter::INFO));
+    registry().with(filter).with(output_layer(format)).init();
+    warn_of(warning);
+    Log
+}
+
+/// The same beside a layer that receives the events of a library. The log leaves them out unless the filter is given.
+pub fn install_beside(format: LogFormat, library: &str, layer: impl Layer<Registry> + Send + Sync) -> Log {
+    let (filter, warning) =
+        filter(Targets::new().with_default(LevelFilter::INFO).with_target(library, LevelFilter::OFF));
+    registry().with(layer).with(output_layer(format).with_filter(filter)).init();
+    warn_of(warning);
+    Log
+}
+
+/// The filter that the environment gives, else the default; and the reason why the given one is ignored.
+fn filter(default: Targets) -> (Targets, Option<String>) {
+    let given = FILTER_VARIABLES.iter().find_map(|name| Some((name, env::var(name).ok()?)));
+    let Some((name, text)) = given else { return (default, None) };
+    let ignored = |error| {
+        format!("{name} = {text:?} is ignored: {error}; must be a level, or as info,hexad_daemon=debug")
+    };
+    match text.parse::<Targets>() {
+        Ok(filter) => (filter, None),
+        Err(error) => (default, Some(ignored(error))),
+    }
+}
+
+fn warn_of(filter: Option<String>) {
+    if let Some(reason) = filter {
+        tracing::warn!("{reason}");
+    }
+}
+
+fn output_layer<S: Subscriber + for<'a> LookupSpan<'a>>(
+    format: LogFormat,
+) -> Box<dyn Layer<S> + Send + Sync> {
+    let _ = FORMAT.set(format);
+    let is_json = format == LogFormat::Json;
+    // The journal adds its own time stamps.
+    if is_journal()
+        && !is_json
+        && let Ok(sink) = journal::connect()
+    {
+        outlet::start(Box::new(sink));
+        return Box::new(journal::Journal);
+    }
+    outlet::start(Box::new(|line| io::stderr().write_all(line)));
+    if is_json {
+        Box::new(fmt::layer().json().flatten_event(true).with_writer(Lines))
+    } else {
+        Box::new(text_layer())
+    }
+}
+
+fn text_layer<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
+    fmt::layer().with_target(false).with_ansi(io::stderr().is_terminal()).with_writer(Lines).fmt_fields(
+        debug_fn(|writer, field, value| match field.name() {
+            "message" => write!(writer, "{value:?}"),
+            name if FIELDS_IN_TEXT.contains(&name) => Ok(()),
+            name => write!(writer, " {name}={value:?}"),
+        }),
+    )
+}
+
+/// Name of the format of this process, for its children.
+pub fn format_name() -> &'static str {
+    match FORMAT.get() {
+        Some(LogFormat::Json) => "json",
+        _ => "text",
+    }
+}
+
+/// Logs the reason why the process ends.
+pub fn report_failure(message: &str) {
+    let is_structured = is_journal() || FORMAT.get() == Some(&LogFormat::Json);
+    if is_structured && tracing::enabled!(Level::ERROR) {
+        tracing::error!("{message}");
+    } else {
+        outlet::put(format!("hexad: {message}\n").into_bytes());
+    }
+}
+
+/// Whether standard error is the stream of the journal that systemd names by device and inode.
+fn is_journal() -> bool {
+    let named = env::var("JOURNAL_STREAM").unwrap_or_default();
+    metadata("/proc/self/fd/2").is_ok_and(|found| named == format!("{}:{}", found.dev(), found.ino()))
+}

@@ -1,0 +1,163 @@
+//! What is claimed of every run under control: names, sentences, and how each is judged.
+//!
+//! A new property is an entry of [`PROPERTIES`]: the searches, the corpus and the table of docs/safety.md follow from it.
+
+use hexad::control::controller::Output;
+use hexad::control::parameters::{Parameters, ViolationPolicy};
+use hexad::control::signals::limits::{DerivativeLimits, Limits};
+use hexad::model::rigid::Twist;
+
+use super::genome::{Genome, World};
+use super::run::Faults;
+use crate::extremes::Quantity;
+use crate::rig::Rig;
+
+/// A cycle, after the platform has moved.
+pub struct Moment<'a> {
+    pub rig: &'a Rig,
+    pub before: &'a Output,
+    pub output: &'a Output,
+    /// Since a request for a stop under control, after which none for control came, and the longest that it may take \[s\].
+    pub stop_s: Option<[f64; 2]>,
+    pub faults: Faults,
+    pub policy: ViolationPolicy,
+}
+
+/// How a property is judged.
+pub enum Judge {
+    /// By the largest value of a quantity of the true motion, or of the reference.
+    Motion(Quantity),
+    /// In each cycle; minus infinity where it says nothing.
+    Cycle(f64, fn(&Moment<'_>) -> f64),
+}
+
+/// A claim.
+pub struct Property {
+    pub name: &'static str,
+    pub claim: &'static str,
+    /// Where it is claimed.
+    pub worlds: &'static [World],
+    /// Whether it is claimed with sensors that freeze, too.
+    pub with_frozen_sensors: bool,
+    pub judge: Judge,
+}
+
+const EVERYWHERE: &[World] = &World::ALL;
+const MODEL: &[World] = &[World::Model];
+
+const fn of_motion(quantity: Quantity, claim: &'static str, worlds: &'static [World]) -> Property {
+    Property {
+        name: quantity.name(),
+        claim,
+        worlds,
+        with_frozen_sensors: false,
+        judge: Judge::Motion(quantity),
+    }
+}
+
+const fn of_reference(quantity: Quantity, claim: &'static str) -> Property {
+    Property { with_frozen_sensors: true, ..of_motion(quantity, claim, EVERYWHERE) }
+}
+
+/// Every property.
+pub const PROPERTIES: [Property; 16] = [
+    of_motion(Quantity::Velocity, "C is at most 2 % faster than `limits.velocity_m_s`", MODEL),
+    of_motion(
+        Quantity::AngularVelocity,
+        "the platform turns at most 2 % faster than `limits.velocity_rad_s`",
+        MODEL,
+    ),
+    of_motion(Quantity::LegRate, "no leg is more than 2 % faster than `actuator.max_rate_m_s`", MODEL),
+    of_motion(
+        Quantity::Acceleration,
+        "the acceleration of C is at most 2 % above what reference and feedback may have together",
+        MODEL,
+    ),
+    of_motion(Quantity::AngularAcceleration, "the same for the angular acceleration", MODEL),
+    of_motion(Quantity::Stroke, "no leg reaches an end stop", MODEL),
+    of_motion(Quantity::Envelope, "the platform stays within the envelope, to 50 um and 100 urad", MODEL),
+    of_motion(Quantity::Condition, "the condition is at most 2 % above `limits.condition`", EVERYWHERE),
+    of_motion(
+        Quantity::Engaging,
+        "while engaging the platform is within the following limits of the reference",
+        MODEL,
+    ),
+    of_motion(
+        Quantity::Following,
+        "under control the platform is within the following limits of the reference",
+        MODEL,
+    ),
+    of_reference(Quantity::ReferenceVelocity, "the reference keeps the limits of velocity"),
+    of_reference(Quantity::ReferenceAcceleration, "the reference keeps the limits of acceleration"),
+    of_reference(Quantity::ReferenceJerk, "the reference keeps the limits of jerk"),
+    of_reference(Quantity::ReferenceStroke, "the reference stays within the stroke less its margin"),
+    Property {
+        name: "fault",
+        claim: "under `on_violation = \"limit\"` no setpoint leads to a fault",
+        worlds: MODEL,
+        with_frozen_sensors: false,
+        judge: Judge::Cycle(0.0, |moment| match moment.policy {
+            ViolationPolicy::Stop => f64::NEG_INFINITY,
+            ViolationPolicy::Limit => f64::from(moment.faults.count),
+        }),
+    },
+    Property {
+        name: "stop time",
+        claim: "a stop at speed v ends in rest within v/A + 2.5 A/J + 50 ms, the longer of both",
+        worlds: EVERYWHERE,
+        with_frozen_sensors: true,
+        judge: Judge::Cycle(1.0, |moment| {
+            moment.stop_s.map_or(f64::NEG_INFINITY, |[since, most]| since / most)
+        }),
+    },
+];
+
+/// Time to rest with the largest acceleration in the direction of a velocity v: that is released (A/J), which adds A^2/(2 J) to v, then
+/// v + A^2/(2 J) is braked with A (v/A + A/(2 J)), and A is released (A/J); 50 ms to notice, settle and say so.
+pub fn longest_stop_s(parameters: &Parameters, twist: &Twist) -> f64 {
+    let time_s = |v: f64, of: &DerivativeLimits| v / of.acceleration + 2.5 * of.acceleration / of.jerk;
+    let Limits { position, orientation, .. } = &parameters.limits;
+    time_s(twist.linear.norm(), position).max(time_s(twist.angular.norm(), orientation)) + 0.05
+}
+
+impl Property {
+    /// The largest value that is no violation.
+    pub fn allowed(&self) -> f64 {
+        match self.judge {
+            Judge::Motion(quantity) => quantity.allowed(),
+            Judge::Cycle(allowed, _) => allowed,
+        }
+    }
+
+    /// Whether it is claimed of a run. With frozen sensors what the platform does depends on when they freeze: `motions` bounds it.
+    pub fn is_claimed(&self, genome: &Genome) -> bool {
+        self.worlds.contains(&genome.world) && (self.with_frozen_sensors || !genome.is_frozen())
+    }
+
+    /// Value in a cycle, or of the motion so far.
+    pub fn value(&self, moment: &Moment<'_>) -> f64 {
+        match self.judge {
+            Judge::Motion(quantity) => moment.rig.meter().extremes.of(quantity),
+            Judge::Cycle(_, judge) => judge(moment),
+        }
+    }
+}
+
+/// Place of a property in [`PROPERTIES`].
+pub fn place(name: &str) -> usize {
+    PROPERTIES
+        .iter()
+        .position(|property| property.name == name)
+        .unwrap_or_else(|| panic!("no property {name}"))
+}
+
+/// The table of docs/safety.md.
+pub fn table() -> String {
+    let row = |property: &Property| {
+        let worlds: Vec<_> = property.worlds.iter().map(|world| world.name()).collect();
+        let frozen = if property.with_frozen_sensors { ", frozen sensors" } else { "" };
+        format!("| {} | {} | {}{frozen} |\n", property.name, property.claim, worlds.join(", "))
+    };
+    "| property | under control | worlds |\n| --- | --- | --- |\n".to_owned()
+        + &PROPERTIES.iter().map(row).collect::<String>()
+}
