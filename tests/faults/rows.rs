@@ -306,7 +306,8 @@ pub const ROWS_UNDER_LIMIT: &[Row] = &[
         TOO_FAR, NEVER_ACTIVE, On, On, On, On, On,
     ]),
     ("too strong an acceleration", setpoints::too_strong, LONG, [On, NEVER_ACTIVE, On, On, On, On, On]),
-    ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [
+    // Pressed against the stroke's end for ever, it creeps along there by less than a millimetre per second.
+    ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, ENDLESS, [
         TOO_FAR, On, On, On, On, On, On,
     ]),
     ("beyond the stroke", setpoints::beyond_stroke, LONG, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),

@@ -296,6 +296,7 @@ fn advance(
     let is_waiting = !cycle.state.has_control() || next == State::Engaging && !are_drives_ready;
     let target = setpoint.target_in(cycle.constants, next).filter(|_| !is_waiting);
     reference.set_closing_scale(if next == State::Engaging { limits.autonomous_scale } else { 1.0 });
+    reference.set_keeps_limits(setpoint.keeps_limits || next == State::Parking);
     reference.advance(cycle.constants, begin_ns.saturating_add(*period_ns), target.as_ref());
     reference.motion_for_held_force(begin_ns.saturating_add(period_ns / 2))
 }

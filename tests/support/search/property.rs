@@ -21,6 +21,8 @@ pub struct Moment<'a> {
     pub stop_s: Option<[f64; 2]>,
     pub faults: Faults,
     pub policy: ViolationPolicy,
+    /// Between the references of both policies, while "stop" has refused no setpoint \[m\], \[rad\].
+    pub policies_apart: Option<f64>,
 }
 
 /// How a property is judged.
@@ -60,7 +62,7 @@ const fn of_reference(quantity: Quantity, claim: &'static str) -> Property {
 }
 
 /// Every property.
-pub const PROPERTIES: [Property; 16] = [
+pub const PROPERTIES: [Property; 17] = [
     of_motion(Quantity::Velocity, "C is at most 2 % faster than `limits.velocity_m_s`", MODEL),
     of_motion(
         Quantity::AngularVelocity,
@@ -109,6 +111,13 @@ pub const PROPERTIES: [Property; 16] = [
         judge: Judge::Cycle(1.0, |moment| {
             moment.stop_s.map_or(f64::NEG_INFINITY, |[since, most]| since / most)
         }),
+    },
+    Property {
+        name: "policies",
+        claim: "what \"stop\" accepts \"limit\" follows with the same reference, to 1e-9 m and rad",
+        worlds: EVERYWHERE,
+        with_frozen_sensors: true,
+        judge: Judge::Cycle(1e-9, |moment| moment.policies_apart.unwrap_or(f64::NEG_INFINITY)),
     },
 ];
 

@@ -1,7 +1,7 @@
 //! One run of a genome: the controller against the plant, scored by the true motion.
 
 use hexad::control::controller::{Controller, Output};
-use hexad::control::parameters::Parameters;
+use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement};
 use hexad::control::signals::limits::Limit;
@@ -73,6 +73,8 @@ pub fn run_with(
         doctor(&mut machine, &mut parameters);
         observed.controller = Controller::new(&machine, parameters);
     }
+    let is_twin = genome.policy == ViolationPolicy::Stop && doctor.is_none();
+    let mut twin = is_twin.then(|| Twin::of(&scenario));
     observed.phase_ns = scenario.phase_ns;
     observed.rates = genome.sensors.rates();
     observed.force_delay_ns = scenario.force_delay_ns;
@@ -99,12 +101,13 @@ pub fn run_with(
         }
         let input = input(&scenario, &observed, &source, &mut channel, &mut frozen);
         let output = observed.cycle(&input);
+        let policies_apart = twin.as_mut().and_then(|twin| twin.apart(&observed.controller, &input, &output));
         watch(&observed, &input, &output);
         faults.add(&before, &output);
         stopped = stopped.filter(|_| output.state.has_control());
         let stop_s = stopped.map(|[at_s, longest_s]| [observed.time_s() - at_s, longest_s]);
         let (rig, policy) = (&observed, genome.policy);
-        let moment = Moment { rig, before: &before, output: &output, stop_s, faults, policy };
+        let moment = Moment { rig, before: &before, output: &output, stop_s, faults, policy, policies_apart };
         for (worst, property) in worst.iter_mut().zip(&PROPERTIES) {
             let value = property.value(&moment);
             *worst = if value.is_nan() { f64::INFINITY } else { worst.max(value) };
@@ -116,6 +119,43 @@ pub fn run_with(
         cycles: observed.meter().cycles,
         fault: faults.last,
         end_stops: u32::from(observed.meter().impact_m_s.is_some()),
+    }
+}
+
+/// A controller under "limit" that gets the inputs of one under "stop".
+struct Twin {
+    controller: Controller,
+    /// Whether the other has refused no setpoint, and both had the same state, since control began.
+    is_equal: bool,
+    /// Whether control has begun: in its first cycle refusals are not counted.
+    has_begun: bool,
+}
+
+impl Twin {
+    fn of(scenario: &Scenario) -> Self {
+        let parameters = Parameters { on_violation: ViolationPolicy::Limit, ..scenario.parameters };
+        let controller = Controller::new(&scenario.config.machine, parameters);
+        Self { controller, is_equal: true, has_begun: false }
+    }
+
+    /// Distance of the references, of translation or rotation, the larger. `stop` has made the output from the input.
+    fn apart(&mut self, stop: &Controller, input: &Input, output: &Output) -> Option<f64> {
+        if !output.state.has_control() || !self.has_begun {
+            self.controller.set_memory(stop.memory().clone());
+            (self.is_equal, self.has_begun) = (true, output.state.has_control());
+            return None;
+        }
+        if !self.is_equal {
+            return None;
+        }
+        let limit = self.controller.step(input);
+        // Engaging ends later under "stop" where the reference stays far from the setpoint.
+        self.is_equal = limit.missed_setpoints == output.missed_setpoints
+            && limit.state == output.state
+            && output.state != State::Stopping;
+        let (stop, limit) = (output.reference.filter(|_| self.is_equal)?, limit.reference?);
+        let apart = stop.pose.displacement_to(&limit.pose);
+        Some(apart.linear.norm().max(apart.angular.norm()))
     }
 }
 

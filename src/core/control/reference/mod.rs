@@ -68,7 +68,7 @@ use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::{Limit, LimitSet};
 use crate::control::signals::pair::Pair;
 use crate::control::signals::time::seconds_between;
-use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 mod history;
 mod proof;
@@ -145,6 +145,10 @@ pub struct ReferenceGenerator {
     active_limits: LimitSet,
     /// Steps after a refusal in which rotation and translation still change in proportion.
     proportional_steps_left: u32,
+    /// Whether the target keeps the limits.
+    keeps_limits: bool,
+    /// Pose that the reference slides to along its walls, because the straight way to it ended at one.
+    slides_to: Option<Pose>,
 }
 
 impl ReferenceGenerator {
@@ -162,6 +166,8 @@ impl ReferenceGenerator {
             strength: 1.0,
             active_limits: LimitSet::default(),
             proportional_steps_left: 0,
+            keeps_limits: true,
+            slides_to: None,
         }
     }
 
@@ -197,6 +203,19 @@ impl ReferenceGenerator {
     /// Sets the share of the limits with which the reference closes the distance to a target.
     pub fn set_closing_scale(&mut self, scale: f64) {
         self.closing_scale = scale;
+    }
+
+    /// Sets whether the target keeps the limits. One that does not is followed along [`Walls`], under
+    /// `on_violation = "limit"`.
+    pub fn set_keeps_limits(&mut self, keeps_limits: bool) {
+        self.keeps_limits = keeps_limits;
+    }
+
+    /// Whether the way to a target needs walls: it leads beyond the limits, or the straight way to a pose
+    /// ended at a bound.
+    fn needs_walls(&self, constants: &Constants, target: &Target<'_>) -> bool {
+        constants.parameters.on_violation == ViolationPolicy::Limit
+            && (!self.keeps_limits || self.slides_to.is_some() && self.slides_to.as_ref() == target.pose())
     }
 
     /// Reference at the end of the last cycle.
@@ -297,6 +316,9 @@ impl ReferenceGenerator {
             match verified {
                 Ok(_) => self.strength = (self.strength * STRENGTH_GROWTH).min(1.0),
                 Err(Refusal::Limit(Limit::Force)) => self.reduce_strength(),
+                Err(Refusal::Limit(Limit::Stroke | Limit::Envelope)) if self.stop.is_at_rest() => {
+                    self.slides_to = target.pose().copied();
+                }
                 Err(_) => {}
             }
             (verified, strength)
@@ -352,7 +374,7 @@ impl ReferenceGenerator {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }
         let (mut effort, mut in_proportion) = (0, self.proportional_steps_left > 0);
-        if constants.parameters.on_violation == ViolationPolicy::Limit {
+        if self.needs_walls(constants, target) {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
             let restricting = walls.project(constants.machine().level, &mut turn, &mut shift);
             effort = walls.effort();

@@ -51,6 +51,11 @@ impl<'a> Target<'a> {
         }
     }
 
+    /// Pose to stand at, if there is one.
+    pub(in crate::control) fn pose(&self) -> Option<&'a Pose> {
+        if let Self::Pose { pose, .. } = self { Some(pose) } else { None }
+    }
+
     /// Motion at an instant, relative to a pose. The continuation of a setpoint is added to first order in
     /// its displacement.
     pub(in crate::control) fn relative_to(

@@ -16,6 +16,8 @@ pub(in crate::control) struct ValidatedSetpoint<'a> {
     pub follow_check: Result<(), Diagnostic>,
     /// Limits that the newest setpoint is near.
     pub active_limits: LimitSet,
+    /// Whether the valid setpoint keeps the limits, as "stop" demands.
+    pub keeps_limits: bool,
 }
 
 impl<'a> ValidatedSetpoint<'a> {

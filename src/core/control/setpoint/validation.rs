@@ -1,17 +1,21 @@
 //! Validation of setpoints.
 //!
-//! The reference keeps its limits for every setpoint, without these checks. Under `on_violation = "stop"`
-//! they find a trajectory that the machine cannot follow, and report the reason:
+//! The reference keeps its limits for every setpoint, without these checks. They find a trajectory that the
+//! machine cannot follow:
 //!
 //! | check | applies to |
 //! | --- | --- |
 //! | numbers, time stamp, kind | every setpoint |
-//! | velocity, acceleration, leg rates | a motion, under "stop" |
-//! | stroke, envelope | a motion or a target, under "stop" |
-//! | deviation within the engage tolerance | a motion that is followed, under "stop" |
+//! | velocity, acceleration, leg rates | a motion |
+//! | stroke, envelope | a motion or a target |
+//! | deviation within the engage tolerance | a motion that is followed |
 //!
 //! The deviation is measured from the reference, and while engaging from the continuation of the previous
 //! setpoint.
+//!
+//! Numbers, time stamp and kind reject a setpoint. The other checks reject it under `on_violation = "stop"`.
+//! Under "limit" they decide whether the reference needs its walls: a setpoint that "stop" accepts is followed
+//! without them, and so with the same reference.
 
 use serde::{Deserialize, Serialize};
 
@@ -46,8 +50,10 @@ const JUMP_RATIO: f64 = 0.5;
 pub(in crate::control) struct SetpointValidator {
     last: LastValid<Setpoint, SetpointMotion>,
     samples: PoseSamples,
-    /// Limits that the newest setpoint is near.
+    /// Limits that the newest setpoint is near, under "stop".
     active_limits: LimitSet,
+    /// Whether the valid setpoint keeps the limits, as "stop" demands.
+    keeps_limits: bool,
     /// Cycles under control without a new valid setpoint.
     pub missed_cycles: u64,
 }
@@ -79,6 +85,7 @@ impl SetpointValidator {
                 _ => Ok(()),
             }),
             active_limits: self.active_limits,
+            keeps_limits: self.keeps_limits,
         }
     }
 
@@ -120,22 +127,26 @@ impl SetpointValidator {
         let parameters = &constants.parameters;
         let followed = self.last.valid.as_ref().filter(|_| is_following(cycle.state));
         let timeout_ns = parameters.setpoint_timeout_ns;
-        let mut active_limits = LimitSet::default();
+        let stops = parameters.on_violation == ViolationPolicy::Stop;
+        let mut near_limits = LimitSet::default();
+        let mut within_limits = Ok(());
         let mut check = || {
             let (code, time_ns) = (DiagnosticCode::SetpointStampInvalid, new.setpoint.time_ns);
             check_time_stamp(code, time_ns, now_ns, timeout_ns)?;
             check_kind(parameters, &new.setpoint)?;
             check_order(new, followed)?;
-            if parameters.on_violation == ViolationPolicy::Stop {
-                check_setpoint(constants.machine(), parameters, new, &mut active_limits)?;
-                check_continuation(cycle, new, followed, reference)?;
-            }
-            Ok(())
+            within_limits = check_setpoint(constants.machine(), parameters, new, &mut near_limits)
+                .and_then(|()| check_continuation(cycle, new, followed, reference));
+            if stops { within_limits } else { Ok(()) }
         };
         let result = check();
-        self.active_limits = active_limits;
-        if result.is_ok() && new.setpoint.kind == SetpointKind::Pose {
-            self.samples.push(now_ns, new.setpoint.time_ns, &new.motion.pose);
+        self.active_limits = if stops { near_limits } else { LimitSet::default() };
+        if result.is_ok() {
+            self.keeps_limits = within_limits.is_ok();
+            if new.setpoint.kind == SetpointKind::Pose {
+                self.samples.push(now_ns, new.setpoint.time_ns, &new.motion.pose);
+                self.keeps_limits &= do_samples_keep_limits(cycle, new, &self.samples, reference);
+            }
         }
         self.last.record(&new.setpoint, result.map(|()| new), now_ns, is_following(cycle.state));
         result.is_ok()
@@ -160,6 +171,26 @@ fn check_return(
 
 fn is_following(state: State) -> bool {
     matches!(state, State::Engaging | State::Active)
+}
+
+/// Whether the motion through the samples keeps the limits, and while it is followed the reference keeps up with it.
+#[inline(never)]
+fn do_samples_keep_limits(
+    cycle: &Cycle<'_>,
+    new: &SetpointMotion,
+    samples: &PoseSamples,
+    reference: &ReferenceGenerator,
+) -> bool {
+    let (constants, parameters) = (cycle.constants, &cycle.constants.parameters);
+    let keeps_up = || {
+        let offset = reference.offset_to(constants, &Target::Samples(samples));
+        offset.is_some_and(|offset| parameters.engage_tolerance_ratio(&offset) <= 1.0)
+    };
+    let Some(motion) = samples.target(cycle.release_ns) else { return false };
+    let mut sampled = *new;
+    sampled.motion = motion;
+    check_setpoint(constants.machine(), parameters, &sampled, &mut LimitSet::default()).is_ok()
+        && (cycle.state != State::Active || keeps_up())
 }
 
 /// Whether the numbers are finite and the policy allows the kind.

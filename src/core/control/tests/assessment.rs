@@ -55,6 +55,7 @@ impl Scene {
             target: Some(Target::Motion(&motion)),
             follow_check: self.status,
             active_limits: LimitSet::default(),
+            keeps_limits: true,
         };
         let free_motion =
             self.twist.map(|twist| Motion { pose, twist, acceleration: Acceleration::default() });

@@ -18,6 +18,7 @@ fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
             target: Some(Target::of_setpoint(&motion, &samples)),
             follow_check: status,
             active_limits: LimitSet::default(),
+            keeps_limits: true,
         };
         for state in [State::Engaging, State::Active] {
             assert_eq!(setpoint.target_in(&constants, state).is_some(), is_valid, "{state:?}");

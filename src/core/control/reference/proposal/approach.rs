@@ -82,6 +82,13 @@ impl Approach {
         Self { limits, closing: limits.scaled(closing_scale), step_s, outer_s }
     }
 
+    /// Approach of a bound: its velocity follows from the distance alone.
+    pub fn of_bound(limits: DerivativeLimits, closing_scale: f64, step_s: f64) -> Self {
+        let mut approach = Self::new(limits, closing_scale, step_s);
+        approach.closing.velocity = f64::INFINITY;
+        approach
+    }
+
     /// Wanted velocities of two vectors. `ahead`: the velocities that the present accelerations lead to.
     pub fn wanted(
         approaches: Pair<&Self>,

@@ -2,17 +2,21 @@
 //!
 //! Each bound has a gap `g`: of a leg's length to an end of its stroke, or of a coordinate to the envelope.
 //! The gradient of the leg or coordinate is G, so that `g' = -G V`. The wanted twist V and its derivative are
-//! changed by the least amount (rotations weighted by the radius of the joints) such that
+//! changed by the least amount such that
 //!
 //! ```text
 //! G V  <= phi(g)
 //! G V' = -phi'(g) G Q - G' Q        where this bound is active
 //! ```
 //!
-//! phi is the lesser of the braking curve of the approach, on a share of the limits, and `2 g / T`. Q is the
-//! present twist. T is the duration of the stop, which brakes along V. If a platform slides past fast, a leg
+//! phi is the lesser of the braking curve of the approach, on a share of the limits of acceleration and jerk, and
+//! `2 g / T`: far from a bound it restricts nothing. Q is the present twist. T is the duration of the stop, which brakes along V. If a platform slides past fast, a leg
 //! that approaches its end slowly moves on for half of T at its rate. If rotation and translation cancel in a
 //! leg, the motion that stops later remains.
+//!
+//! The amount of a change is `sum (dV_i^2 / (|V_i| + w |V|))`, rotations times the radius of the joints. So each
+//! coordinate is changed in proportion to what is wanted of it: a platform that is pressed against a bound becomes
+//! slower along its own direction, and a coordinate that is to stand hardly moves to serve another.
 //!
 //! The bound on V' is blended in. It holds fully once the wall removes `a^2/j` from V, the change of velocity
 //! while the acceleration builds up and ends again. Without blending, V' would jump whenever another wall becomes active,
@@ -22,8 +26,9 @@
 //! quadratic programming procedure", 1957), in a few sweeps over all walls. The walls prove nothing: the
 //! verified stop keeps the bounds. Without walls it would keep them with a motion at the limits of jerk.
 //!
-//! Walls are used under `on_violation = "limit"` only. A certified trajectory may go as near to a bound as it
-//! can be stopped.
+//! Walls are used under `on_violation = "limit"`, for setpoints that "stop" would reject: those beyond a limit, and
+//! those that the reference could not keep up with. A setpoint that keeps the limits may go as near to a bound as it
+//! can be stopped. On the way to a pose walls are used once the reference rests at a bound.
 
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 #[cfg(not(feature = "std"))]
@@ -45,10 +50,14 @@ use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::task_coordinates;
 
-/// Share of the limits with which a wall is approached. Several walls and the motion along them take the
+/// Share of the limits of acceleration and jerk with which a wall is approached. Several walls and the motion along them take the
 /// rest.
 const WALL_CLOSING_LIMITS_SHARE: f64 = 0.6;
-/// Sweeps over the walls: 8 sweeps bring two walls at 60 degrees to within 1e-4 (2026-11-22). With many
+/// `w`: weight of all of the wanted velocity in the amount that a coordinate may change.
+const SHARED_WEIGHT: f64 = 0.02;
+/// Speed below which nothing is wanted of any coordinate \[m/s\].
+const SMALLEST_SPEED: f64 = 1e-9;
+/// Sweeps over the walls: 8 sweeps bring two walls at 60 degrees to within 1e-3 (2026-11-29). With many
 /// active walls there are fewer sweeps, because the next number of visits to walls bounds the longest cycle.
 /// Six walls hold every direction; more contradict each other.
 const SWEEPS: usize = 8;
@@ -106,6 +115,17 @@ struct Wall {
     blend_rate: f64,
 }
 
+impl Wall {
+    /// Changes the coordinates: each is divided by its scale.
+    #[inline(always)]
+    fn scale_by<S: Simd>(&mut self, simd: S, scale: f64x8<S>) {
+        let gradient = f64x8::load_array(simd, self.gradient) * scale;
+        let square = dot(gradient, gradient).max(f64::MIN_POSITIVE);
+        self.blend_rate *= square * self.inverse_square;
+        (self.gradient, self.inverse_square) = (gradient.to_array(), 1.0 / square);
+    }
+}
+
 /// Walls around one pose.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct Walls {
@@ -132,7 +152,7 @@ impl Walls {
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
-        let approach = Approach::new(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
+        let approach = Approach::of_bound(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let halves_s = half_durations(limits, led);
         let half_s = halves_s.angular.max(halves_s.linear);
         let per_way = 1.0 / half_s;
@@ -189,8 +209,8 @@ impl Walls {
             stacked(&zero, &Vector3::y()),
             stacked(&zero, &Vector3::z()),
         ];
-        let turning = Approach::new(limits.orientation, WALL_CLOSING_LIMITS_SHARE, step_s);
-        let shifting = Approach::new(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
+        let turning = Approach::of_bound(limits.orientation, WALL_CLOSING_LIMITS_SHARE, step_s);
+        let shifting = Approach::of_bound(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let velocity = stacked(&(led.angular * radius), &led.linear);
         let per_way = half_durations(limits, led).map(f64::recip);
         let ranges = lowest.iter().zip(highest);
@@ -250,8 +270,16 @@ impl Walls {
         let load = |turn: &Vector3<f64>, shift: &Vector3<f64>| {
             f64x8::load_array(simd, padded(&stacked(&(turn * self.radius), shift)))
         };
-        let mut velocity = load(&turn.velocity, &shift.velocity);
+        let wanted = load(&turn.velocity, &shift.velocity);
+        let speed = dot(wanted, wanted).sqrt().max(SMALLEST_SPEED);
+        // In coordinates in which the least change is the shortest.
+        let amounts = wanted.max(-wanted) * f64x8::splat(simd, 1.0 / speed);
+        let scale = (amounts + f64x8::splat(simd, SHARED_WEIGHT)).sqrt();
         let walls = self.walls.get_mut(..self.count).unwrap_or_default();
+        for wall in walls.iter_mut() {
+            wall.scale_by(simd, scale);
+        }
+        let mut velocity = wanted / scale;
         let mut sweeps = SWEEPS;
         let mut sweep = 0;
         while sweep < sweeps {
@@ -291,7 +319,7 @@ impl Walls {
         if restricting.is_empty() {
             return restricting;
         }
-        let mut derivative = load(&turn.derivative, &shift.derivative);
+        let mut derivative = load(&turn.derivative, &shift.derivative) / scale;
         for _ in 0..sweeps {
             for bound in &mut active {
                 let gradient = f64x8::load_array(simd, *bound.gradient);
@@ -304,8 +332,8 @@ impl Walls {
             let [mx, my, mz, x, y, z, ..] = lanes.to_array();
             (*turn, *shift) = (Vector3::new(mx, my, mz) / self.radius, Vector3::new(x, y, z));
         };
-        store(velocity, &mut turn.velocity, &mut shift.velocity);
-        store(derivative, &mut turn.derivative, &mut shift.derivative);
+        store(velocity * scale, &mut turn.velocity, &mut shift.velocity);
+        store(derivative * scale, &mut turn.derivative, &mut shift.derivative);
         restricting
     }
 }

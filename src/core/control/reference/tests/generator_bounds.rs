@@ -166,11 +166,13 @@ fn a_reference_beyond_a_bound_by_rounding_only_returns() {
     }
 }
 
-/// Under "limit" the walls keep 0.5 % of the stroke from a bound. Under "stop" a trajectory may go as near as
-/// it can be stopped.
+/// Under "limit" the walls keep 0.5 % of the stroke from a bound, for a setpoint beyond the limits. A trajectory that keeps
+/// them may go as near as it can be stopped.
 #[test]
-fn walls_keep_their_distance_under_limit_only() {
-    for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
+fn walls_keep_their_distance_under_limit_and_beyond_limits_only() {
+    let (stop, limit) = (ViolationPolicy::Stop, ViolationPolicy::Limit);
+    for (policy, keeps_limits) in [(stop, false), (limit, true), (limit, false)] {
+        let are_walls_used = policy == limit && !keeps_limits;
         let constants = constants(|_, parameters| {
             parameters.on_violation = policy;
             parameters.envelope = around_home([0.4, 0.4, 0.4, 0.2, 0.2, 0.2]);
@@ -182,11 +184,15 @@ fn walls_keep_their_distance_under_limit_only() {
             offset[axis] = end - near * end.signum();
             let setpoint = standing(&constants, offset);
             let mut reference = started(&constants, &at_rest(constants.home.pose()));
+            reference.set_keeps_limits(keeps_limits);
             run(&constants, &mut reference, &Target::Motion(&setpoint), 3000);
             let left = end.abs() - x(&constants, &reference)[axis].abs();
-            let expected = if policy == ViolationPolicy::Stop { near } else { kept };
-            assert!((left - expected).abs() < 1e-6, "{policy:?} {axis}: {left}, not {expected}");
-            assert_eq!(reference.active_limits().contains(Limit::Envelope), policy == ViolationPolicy::Limit);
+            let expected = if are_walls_used { kept } else { near };
+            assert!(
+                (left - expected).abs() < 1e-6,
+                "{policy:?} {keeps_limits} {axis}: {left}, not {expected}"
+            );
+            assert_eq!(reference.active_limits().contains(Limit::Envelope), are_walls_used);
         }
     }
 }

@@ -73,7 +73,7 @@ impl Scene {
 /// The approach of a wall: 0.6 of the limits.
 fn approach(constants: &Constants, is_angle: bool) -> Approach {
     let limits = &constants.parameters.limits;
-    Approach::new(if is_angle { limits.orientation } else { limits.position }, 0.6, STEP_S)
+    Approach::of_bound(if is_angle { limits.orientation } else { limits.position }, 0.6, STEP_S)
 }
 
 #[test]
@@ -212,8 +212,8 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
     assert!(nearest > 1000 && worst > 0.95 * WALL_RATIO, "{nearest}: {worst}");
 }
 
-/// Conditions of the nearest velocity: no wall is approached too fast, and the change is a sum of the active
-/// gradients with positive multiples.
+/// Conditions of the nearest velocity: no wall is approached too fast, and the change over its amount is a sum of the
+/// active gradients with positive multiples.
 #[test]
 fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
     let mut samples = RandomVectors::new(72);
@@ -232,7 +232,9 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
         let of = |first: &Vector3<f64>, second: &Vector3<f64>| stacked(&(first * walls.radius), second);
         let [before, after] = [(&turn, &shift), (&new_turn, &new_shift)]
             .map(|(turn, shift)| of(&turn.velocity, &shift.velocity));
-        let ends = ends(&walls);
+        // The gradients as they were before they were scaled.
+        let pairs = ends(&walls).into_iter().zip(ends(&scene.walls()));
+        let ends: Vec<_> = pairs.map(|(end, WallEnd { gradient, .. })| WallEnd { gradient, ..end }).collect();
         let active: Vec<&WallEnd> = ends.iter().filter(|end| end.multiplier > 0.0).collect();
         for (k, wall) in ends.iter().enumerate() {
             // Far beyond one end the return is no faster than the other end may be approached.
@@ -241,8 +243,10 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
                 assert!(excess < 1e-9, "{excess}");
             }
         }
+        let speed = before.norm().max(SMALLEST_SPEED);
+        let amounts = before.map(|wanted| wanted.abs() / speed + SHARED_WEIGHT);
         let change: Vector6<f64> = active.iter().map(|wall| wall.gradient * wall.multiplier).sum();
-        assert!((before - change - after).norm() < 1e-9);
+        assert!((before - change.component_mul(&amounts) - after).norm() < 1e-9);
         // The effort is bounded, and zero if no wall is active.
         most_work = most_work.max(walls.effort());
         assert!(walls.effort() <= 4 && (!active.is_empty() || walls.effort() == 0), "{}", walls.effort());
@@ -276,7 +280,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
     assert!(several > 50 && free > 10 && partly > 3 && most_work == 3, "{several} {free} {partly}");
 }
 
-/// Two walls at 60 degrees, like the faces of a wedge: 8 sweeps leave 1e-4 of the excess.
+/// Two walls at 60 degrees, like the faces of a wedge: 8 sweeps leave 1e-3 of the excess.
 #[test]
 fn two_walls_at_60_degrees_converge() {
     let mut samples = RandomVectors::new(73);
@@ -297,8 +301,8 @@ fn two_walls_at_60_degrees_converge() {
     let (mut turn, mut shift) = (still, WantedVelocity { velocity: along, derivative: along * 3.0, ..still });
     walls.project(scene.constants.machine().level, &mut turn, &mut shift);
     for direction in directions {
-        assert!(direction.dot(&shift.velocity).abs() < 1e-4, "{}", shift.velocity);
-        assert!(direction.dot(&shift.derivative).abs() < 1e-4, "{}", shift.derivative);
+        assert!(direction.dot(&shift.velocity).abs() < 1e-3, "{}", shift.velocity);
+        assert!(direction.dot(&shift.derivative).abs() < 2e-3, "{}", shift.derivative);
     }
     assert_eq!(turn.velocity, Vector3::zeros());
 }
