@@ -11,8 +11,7 @@ use super::Script;
 use super::recorder::{Moment, Recorder};
 
 const LIMIT: &str = "[setpoint]\non_violation = \"limit\"\n[drive]\ndelay_us = 100.0\n";
-const LIMIT_500: &str =
-    "[setpoint]\non_violation = \"limit\"\n[realtime]\nrate_hz = 500.0\n[limits]\nautonomous_scale = 1.0\nforce_rate_n_s = 450.0";
+const LIMIT_500: &str = "[setpoint]\non_violation = \"limit\"\n[realtime]\nrate_hz = 500.0\n[limits]\nautonomous_scale = 1.0\nforce_rate_n_s = 450.0";
 
 pub const SCRIPTS: &[Script] = &[
     ("setpoints_wrong_stop", "tilted", "[drive]\ndelay_us = 100.0", wrong_under_stop),
