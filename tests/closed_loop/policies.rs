@@ -214,3 +214,47 @@ fn numbers_that_are_not_finite_lead_to_a_pose_that_is_held() {
     let active = (0..100).any(|_| ride.follow(Some(home)).state == State::Active);
     assert!(active, "engages again");
 }
+
+/// A ride within the limits is followed where it asks, however near the limit of velocity is; sent as poses alone, with a lag.
+#[test]
+fn a_ride_within_the_limits_is_followed_where_it_asks() {
+    for velocity in [0.12, 0.15, 0.2, 0.5] {
+        let mut config = with_policy("motion_base", ViolationPolicy::Limit);
+        config.deployment.limits.reference.position.velocity = velocity;
+        let home = TaskState::at_rest(config.machine.home);
+        let at = |t: f64| {
+            let mut task = home;
+            // 7 degrees of pitch, 90 mm of heave.
+            for (axis, size, omega) in [(1, 0.06, 1.3), (5, 0.045, 1.2)] {
+                let (sin, cos) = (omega * t.max(0.0)).sin_cos();
+                task.x[axis] += size * (1.0 - cos);
+                (task.xd[axis], task.xdd[axis]) = (size * omega * sin, size * omega * omega * cos);
+            }
+            task
+        };
+        let mut ride = Ride::new(&config);
+        for cycle in 0..5000 {
+            let task = at(f64::from(cycle) * 1e-3);
+            let output = ride.follow(Some(task));
+            let [position, orientation] = ride.distance(&task);
+            assert!(
+                position < 1e-4 && orientation < 2e-4,
+                "{velocity}, {cycle}: {position} m, {orientation} rad"
+            );
+            assert!(!output.active_limits.contains(Limit::Stroke), "{velocity}, {cycle}: {output:?}");
+        }
+        let mut ride = Ride::new(&config);
+        let lags = (10..60).map(|lag| f64::from(lag) * 1e-3);
+        let mut furthest: Vec<_> = lags.map(|lag| (0.0_f64, lag)).collect();
+        for cycle in 0..5000 {
+            let t = f64::from(cycle) * 1e-3;
+            ride.cycle(SetpointKind::Pose, (cycle % 10 == 0).then(|| at(t)));
+            for (furthest, lag) in furthest.iter_mut().filter(|_| cycle > 500) {
+                *furthest = furthest.max(ride.distance(&at(t - *lag))[0]);
+            }
+        }
+        let (furthest, lag) = furthest.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        println!("{velocity}: poses are followed {lag} s later, within {furthest} m");
+        assert!(furthest < 1e-4, "{velocity}: {furthest} m, {lag} s later");
+    }
+}
