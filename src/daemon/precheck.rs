@@ -11,7 +11,7 @@ use nalgebra::Vector6;
 
 use super::parameters::parameters;
 use hexad_core::control::constants::Constants;
-use hexad_core::control::parameters::{Envelope, Parameters};
+use hexad_core::control::parameters::{Envelope, Parameters, ViolationPolicy};
 use hexad_core::control::reference::ReferenceGenerator;
 use hexad_core::control::setpoint::motion::SetpointMotion;
 use hexad_core::control::setpoint::target::Target;
@@ -111,7 +111,8 @@ impl<'a> Precheck<'a> {
                 .and_then(|()| check_deviation(&self.parameters, &reference, &before, &now));
             if let Err(diagnostic) = result {
                 let active_limits = active_limits.union(reference.active_limits());
-                let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits };
+                let policy = self.parameters.on_violation;
+                let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits, policy };
                 if refused(refusal).is_break() {
                     break;
                 }
@@ -136,11 +137,15 @@ pub struct SetpointRefusal {
     pub t: f64,
     diagnostic: Diagnostic,
     active_limits: LimitSet,
+    policy: ViolationPolicy,
 }
+
+/// Remedy that is no remedy where it is set already.
+const ADVICE_OF_LIMIT: &str = ", or set [setpoint] on_violation to limit";
 
 impl fmt::Display for SetpointRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { t, diagnostic, active_limits } = self;
+        let Self { t, diagnostic, active_limits, policy } = self;
         write!(f, "t = {t:.4}: ")?;
         // In reverse order of the checks, which end at the first exceeded limit.
         let limits = [Limit::Jerk, Limit::LegRate, Limit::Acceleration, Limit::Velocity];
@@ -148,6 +153,9 @@ impl fmt::Display for SetpointRefusal {
         if let (DiagnosticCode::SetpointTooFast, Some(limit)) = (diagnostic.code, beyond) {
             write!(f, "{}: ", limit.name())?;
         }
-        write!(f, "{diagnostic}")
+        match policy {
+            ViolationPolicy::Stop => write!(f, "{diagnostic}"),
+            ViolationPolicy::Limit => write!(f, "{}", diagnostic.to_string().replace(ADVICE_OF_LIMIT, "")),
+        }
     }
 }

@@ -254,6 +254,12 @@ fn what_the_daemon_would_refuse_is_told_before_it_begins() {
         let first = message.lines().next().unwrap();
         assert!(first.starts_with(&format!("{}: ", folder.path("t.csv").display())), "{first}");
         has(first, words);
+        assert_eq!(first.contains("on_violation"), words.contains(&"setpoint beyond the limits"), "{first}");
+        // Nothing is advised that is set.
+        folder
+            .write("machine.toml", folder.read("machine.toml") + "\n[setpoint]\non_violation = \"limit\"\n");
+        let message = folder.refuses("move @M --trajectory @/t.csv", words);
+        assert!(!message.contains("on_violation"), "{message}");
     }
     assert!((SECONDS, HOME) == (1.5, 1.1), "the lines above are of this motion");
 }

@@ -124,6 +124,22 @@ impl Wall {
         self.blend_rate *= square * self.inverse_square;
         (self.gradient, self.inverse_square) = (gradient.to_array(), 1.0 / square);
     }
+
+    /// Takes from a velocity what is beyond the ends. Returns whether that changed.
+    #[inline(always)]
+    fn restrict<S: Simd>(&mut self, simd: S, velocity: &mut f64x8<S>) -> bool {
+        let Self { ends: [against, along], inverse_square, multiplier, .. } = *self;
+        let gradient = f64x8::load_array(simd, self.gradient);
+        // Closing rate without this wall, and the part of it beyond the ends.
+        let rate = dot(gradient, *velocity) * inverse_square + multiplier;
+        let allowed = rate.min(along.rate * inverse_square).max(-against.rate * inverse_square);
+        self.multiplier = rate - allowed;
+        if self.multiplier == multiplier {
+            return false;
+        }
+        *velocity -= gradient * f64x8::splat(simd, self.multiplier - multiplier);
+        true
+    }
 }
 
 /// Walls around one pose.
@@ -271,9 +287,9 @@ impl Walls {
             f64x8::load_array(simd, padded(&stacked(&(turn * self.radius), shift)))
         };
         let wanted = load(&turn.velocity, &shift.velocity);
-        let speed = dot(wanted, wanted).sqrt().max(SMALLEST_SPEED);
         // In coordinates in which the least change is the shortest.
-        let amounts = wanted.max(-wanted) * f64x8::splat(simd, 1.0 / speed);
+        let per_speed = 1.0 / dot(wanted, wanted).sqrt().max(SMALLEST_SPEED);
+        let amounts = wanted.max(-wanted) * f64x8::splat(simd, per_speed);
         let scale = (amounts + f64x8::splat(simd, SHARED_WEIGHT)).sqrt();
         let walls = self.walls.get_mut(..self.count).unwrap_or_default();
         for wall in walls.iter_mut() {
@@ -289,19 +305,8 @@ impl Walls {
                 if !is_full && wall.multiplier == 0.0 {
                     continue;
                 }
-                let [against, along] = &wall.ends;
-                let gradient = f64x8::load_array(simd, wall.gradient);
-                // Closing rate without this wall, and the part of it beyond the ends.
-                let rate = dot(gradient, velocity) * wall.inverse_square + wall.multiplier;
-                let allowed =
-                    rate.min(along.rate * wall.inverse_square).max(-against.rate * wall.inverse_square);
-                let multiplier = rate - allowed;
-                if multiplier != wall.multiplier {
-                    velocity -= gradient * f64x8::splat(simd, multiplier - wall.multiplier);
-                    wall.multiplier = multiplier;
-                    is_changed = true;
-                }
-                active += usize::from(multiplier != 0.0);
+                is_changed |= wall.restrict(simd, &mut velocity);
+                active += usize::from(wall.multiplier != 0.0);
                 self.visits += 1;
             }
             if is_full && !is_changed {
