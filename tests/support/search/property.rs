@@ -105,7 +105,7 @@ pub const PROPERTIES: [Property; 17] = [
     },
     Property {
         name: "stop time",
-        claim: "a stop at speed v ends in rest within v/A + 2.5 A/J + 50 ms, the longer of both",
+        claim: "a stop at speed v ends in rest within v/A + 2.5 A/J + 55 ms, the longer of both",
         worlds: EVERYWHERE,
         with_frozen_sensors: true,
         judge: Judge::Cycle(1.0, |moment| {
@@ -114,7 +114,7 @@ pub const PROPERTIES: [Property; 17] = [
     },
     Property {
         name: "policies",
-        claim: "what \"stop\" accepts \"limit\" follows with the same reference, to 1e-9 m and rad",
+        claim: "what \"stop\" accepts \"limit\" follows with the same reference, to 1e-9 m and rad, unless a bound is in the straight way to a target",
         worlds: EVERYWHERE,
         with_frozen_sensors: true,
         judge: Judge::Cycle(1e-9, |moment| moment.policies_apart.unwrap_or(f64::NEG_INFINITY)),
@@ -122,11 +122,11 @@ pub const PROPERTIES: [Property; 17] = [
 ];
 
 /// Time to rest with the largest acceleration in the direction of a velocity v: that is released (A/J), which adds A^2/(2 J) to v, then
-/// v + A^2/(2 J) is braked with A (v/A + A/(2 J)), and A is released (A/J); 50 ms to notice, settle and say so.
+/// v + A^2/(2 J) is braked with A (v/A + A/(2 J)), and A is released (A/J); 55 ms to notice, settle and say so.
 pub fn longest_stop_s(parameters: &Parameters, twist: &Twist) -> f64 {
     let time_s = |v: f64, of: &DerivativeLimits| v / of.acceleration + 2.5 * of.acceleration / of.jerk;
     let Limits { position, orientation, .. } = &parameters.limits;
-    time_s(twist.linear.norm(), position).max(time_s(twist.angular.norm(), orientation)) + 0.05
+    time_s(twist.linear.norm(), position).max(time_s(twist.angular.norm(), orientation)) + 0.055
 }
 
 impl Property {

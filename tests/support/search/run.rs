@@ -154,6 +154,10 @@ impl Twin {
             && limit.state == output.state
             && output.state != State::Stopping;
         let (stop, limit) = (output.reference.filter(|_| self.is_equal)?, limit.reference?);
+        // Under "stop" it rests for good where the straight way to a target meets a bound.
+        let is_at_bound =
+            [Limit::Stroke, Limit::Envelope].iter().any(|it| output.active_limits.contains(*it));
+        self.is_equal = !(is_at_bound && stop.twist.vector().amax() == 0.0);
         let apart = stop.pose.displacement_to(&limit.pose);
         Some(apart.linear.norm().max(apart.angular.norm()))
     }

@@ -147,6 +147,8 @@ pub struct ReferenceGenerator {
     proportional_steps_left: u32,
     /// Whether the target keeps the limits.
     keeps_limits: bool,
+    /// Steps since one was accepted.
+    stuck_steps: u32,
     /// Pose that the reference slides to along its walls, because the straight way to it ended at one.
     slides_to: Option<Pose>,
 }
@@ -167,6 +169,7 @@ impl ReferenceGenerator {
             active_limits: LimitSet::default(),
             proportional_steps_left: 0,
             keeps_limits: true,
+            stuck_steps: 0,
             slides_to: None,
         }
     }
@@ -313,10 +316,14 @@ impl ReferenceGenerator {
                 Ok(_) => self.proportional_steps_left.saturating_sub(1),
                 Err(_) => PROPORTIONAL_STEPS_AFTER_REFUSAL,
             };
+            self.stuck_steps = if verified.is_ok() { 0 } else { self.stuck_steps.saturating_add(1) };
             match verified {
                 Ok(_) => self.strength = (self.strength * STRENGTH_GROWTH).min(1.0),
                 Err(Refusal::Limit(Limit::Force)) => self.reduce_strength(),
-                Err(Refusal::Limit(Limit::Stroke | Limit::Envelope)) if self.stop.is_at_rest() => {
+                // In proportion too, the straight way leads into a bound.
+                Err(Refusal::Limit(Limit::Stroke | Limit::Envelope))
+                    if self.stop.is_at_rest() && self.stuck_steps > PROPORTIONAL_STEPS_AFTER_REFUSAL =>
+                {
                     self.slides_to = target.pose().copied();
                 }
                 Err(_) => {}
