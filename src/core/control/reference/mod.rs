@@ -208,7 +208,7 @@ impl ReferenceGenerator {
         self.closing_scale = scale;
     }
 
-    /// Sets whether the target keeps the limits. One that does not is followed along [`Walls`], under
+    /// Sets whether the target keeps the limits. One that does not is followed along walls, under
     /// `on_violation = "limit"`.
     pub fn set_keeps_limits(&mut self, keeps_limits: bool) {
         self.keeps_limits = keeps_limits;
