@@ -37,11 +37,11 @@ fn an_operator_finds_and_stops_all_machines() {
         fs::write(cell.hosts.path(&format!("{k}-network.toml")), network_file(name, &endpoint)).unwrap();
         cell.hosts.start(DAEMONS[k], cell.hosts.hexad(&format!("run --config {k}.toml")));
         let arguments = format!("run {k}-network.toml {k}.toml");
+        cell.hosts.wait_for(DAEMONS[k], "running name");
         cell.hosts.start(BRIDGES[k], cell.hosts.command(Host::Machine, Path::new(BRIDGE), &arguments));
+        cell.hosts.wait_for(BRIDGES[k], "the bridge is open");
     }
     fs::write(cell.hosts.path("fleet.toml"), fleet).unwrap();
-    DAEMONS.iter().for_each(|daemon| cell.hosts.wait_for(daemon, "running name"));
-    BRIDGES.iter().for_each(|bridge| cell.hosts.wait_for(bridge, "the bridge is open"));
 
     let (out, errors, is_success) = operate(&cell, "status fleet.toml");
     assert!(is_success && names.iter().all(|name| out.contains(name.as_str())), "{out}{errors}");
