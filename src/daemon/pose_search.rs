@@ -1,7 +1,8 @@
 //! Search for other assembly modes of the measured leg lengths, each time that forward kinematics has found the pose of the platform.
 //! While there is one, the controller does not begin control.
 //!
-//! The lengths alone do not determine the assembly mode. An external pose (`pose_valid = 1`) or an operator selects it. The search for poses that the joints permit takes some milliseconds. A wider one, over the region in which
+//! The lengths alone do not determine the assembly mode. An external pose (`pose_valid = 1`) or an operator selects it. The search for poses that the
+//! joints permit takes some milliseconds. A wider one, over the region in which
 //! `hexad check` searches around home, follows once for some tenths of a second, and only warns.
 
 use core::sync::atomic::{AtomicBool, Ordering};

@@ -10,9 +10,9 @@
 //! ```
 //!
 //! phi is the lesser of the braking curve of the approach, on a share of the limits of acceleration and jerk, and
-//! `2 g / T`: far from a bound it restricts nothing. Q is the present twist. T is the duration of the stop, which brakes along V. If a platform slides past fast, a leg
-//! that approaches its end slowly moves on for half of T at its rate. If rotation and translation cancel in a
-//! leg, the motion that stops later remains.
+//! `2 g / T`: far from a bound it restricts nothing. Q is the present twist. T is the duration of the stop, which
+//! brakes along V. If a platform slides past fast, a leg that approaches its end slowly moves on for half of T at its
+//! rate. If rotation and translation cancel in a leg, the motion that stops later remains.
 //!
 //! The amount of a change is `sum (dV_i^2 / (|V_i| + w |V|))`, rotations times the radius of the joints. So each
 //! coordinate is changed in proportion to what is wanted of it: a platform that is pressed against a bound becomes
