@@ -9,7 +9,7 @@ use nix::unistd;
 
 use super::recording::file::writes;
 use hexad_client::realtime::process::block_signals;
-use hexad_machine::log::{Log, report_failure};
+use hexad_machine::log::report_failure;
 
 /// Longest time at the end in which nothing is written to files.
 const END_LIMIT: Duration = Duration::from_millis(700);
@@ -25,7 +25,6 @@ pub(super) fn end_watch() -> Option<Sender<()>> {
                 report_failure(
                     "a file system does not answer: the daemon ends without the rest of its files",
                 );
-                drop(Log);
                 process::exit(1);
             }
             before = writes();

@@ -119,7 +119,7 @@ pub fn format_name() -> &'static str {
     }
 }
 
-/// Logs the reason why the process ends.
+/// Logs the reason why the process ends, and waits until it is written, unless that takes long.
 pub fn report_failure(message: &str) {
     let is_structured = is_journal() || FORMAT.get() == Some(&LogFormat::Json);
     if is_structured && tracing::enabled!(Level::ERROR) {
@@ -127,10 +127,31 @@ pub fn report_failure(message: &str) {
     } else {
         outlet::put(format!("hexad: {message}\n").into_bytes());
     }
+    drop(Log);
 }
 
 /// Whether standard error is the stream of the journal that systemd names by device and inode.
 fn is_journal() -> bool {
     let named = env::var("JOURNAL_STREAM").unwrap_or_default();
     metadata("/proc/self/fd/2").is_ok_and(|found| named == format!("{}:{}", found.dev(), found.ino()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+    use std::thread::sleep;
+    use std::time::Duration;
+
+    use super::{outlet, report_failure};
+
+    #[test]
+    fn the_reason_of_the_end_is_written_before_the_process_ends() {
+        let (written, lines) = channel();
+        outlet::start(Box::new(move |line| {
+            sleep(Duration::from_millis(50));
+            written.send(line.to_vec()).map_err(std::io::Error::other)
+        }));
+        report_failure("no machine");
+        assert_eq!(lines.try_recv().as_deref(), Ok(&b"hexad: no machine\n"[..]));
+    }
 }

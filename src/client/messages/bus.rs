@@ -6,6 +6,9 @@
 //! A peer that connects or disappears is handled inside the next send or receive of every participant: allocations,
 //! system calls, up to 0.1 ms. No real-time thread may own a port.
 
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::PortFactory as _;
@@ -67,6 +70,25 @@ fn with_cure(words: &str) -> String {
     cure.map_or_else(|| words.into(), |(_, cure)| format!("{cure} ({words})"))
 }
 
+/// Errors of what another participant is just creating or removing: of a topic, and of a node.
+const UNSETTLED: [&str; 4] = ["HangsInCreation", "SystemInFlux", "IsBeingCreated", "InternalError"];
+
+/// Longest time that a participant takes to create or remove what it shares: it reads its program from a slow disk, or has no processor.
+const SETTLING_LIMIT: Duration = Duration::from_secs(2);
+
+/// The result of an attempt after others have created or removed what it needs. Only while ports are opened: it waits.
+fn when_settled<T, E: core::fmt::Debug>(mut attempt: impl FnMut() -> Result<T, E>) -> Result<T, E> {
+    let begun = Instant::now();
+    loop {
+        let result = attempt();
+        let is_unsettled = |error: &E| UNSETTLED.iter().any(|name| format!("{error:?}").contains(name));
+        if !result.as_ref().is_err_and(is_unsettled) || begun.elapsed() >= SETTLING_LIMIT {
+            return result;
+        }
+        sleep(Duration::from_millis(5));
+    }
+}
+
 /// Participation of this process in the topics of one machine.
 pub struct Bus {
     node: Node<ipc::Service>,
@@ -92,12 +114,12 @@ impl Bus {
         // Its warnings (cleaned-up dead nodes) are routine here.
         set_log_level(LogLevel::Error);
         let location = Location::open()?;
-        let created = NodeBuilder::new()
+        let create = || {
             // Signals belong to the command line, not to a library's wait loop.
-            .signal_handling_mode(SignalHandlingMode::Disabled)
-            .config(&location.config)
-            .create::<ipc::Service>();
-        let node = created.map_err(|cause| {
+            let builder = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled);
+            builder.config(&location.config).create::<ipc::Service>()
+        };
+        let node = when_settled(create).map_err(|cause| {
             let known = refusal().or_else(|| location.obstacle());
             let cause = known.unwrap_or_else(|| format!("{cause:?}"));
             PortError::new("cannot create a node".into(), cause)
@@ -146,17 +168,13 @@ impl Bus {
         let prefix = if self.is_simulated { "hexad-simulated" } else { "hexad" };
         let name = format!("{prefix}/{}/{}", self.machine, T::TOPIC);
         let service_name = name.as_str().try_into().map_err(port_error(format!("bad topic {name}")))?;
-        self.node
-            .service_builder(&service_name)
-            .publish_subscribe::<T>()
-            .max_publishers(T::MAX_PUBLISHERS)
-            .max_subscribers(MAX_SUBSCRIBERS)
-            .max_nodes(MAX_NODES)
-            .subscriber_max_buffer_size(BUFFER)
-            .enable_safe_overflow(true)
-            .history_size(0)
-            .open_or_create()
-            .map_err(port_error(format!("cannot open topic {name}")))
+        let open = || {
+            let builder = self.node.service_builder(&service_name).publish_subscribe::<T>();
+            let builder = builder.max_publishers(T::MAX_PUBLISHERS).max_subscribers(MAX_SUBSCRIBERS);
+            let builder = builder.max_nodes(MAX_NODES).subscriber_max_buffer_size(BUFFER);
+            builder.enable_safe_overflow(true).history_size(0).open_or_create()
+        };
+        when_settled(open).map_err(port_error(format!("cannot open topic {name}")))
     }
 }
 
@@ -178,7 +196,34 @@ impl<T: Message> TopicObserver<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::with_cure;
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::PathBuf;
+    use std::time::Duration;
+    use std::{fs, thread};
+
+    use super::super::ForceMessage;
+    use super::super::location::{BOOKS, user_folder};
+    use super::{Bus, with_cure};
+
+    /// As a participant that waits for its disk leaves a topic: its description is not yet readable.
+    #[test]
+    fn a_topic_that_another_is_just_creating_is_waited_for() {
+        let name = format!("case_creation_{}", std::process::id());
+        let first = Bus::join(&name).unwrap();
+        let _port = first.publisher::<ForceMessage>().unwrap();
+        let is_of_topic = |path: &PathBuf| fs::read_to_string(path).is_ok_and(|text| text.contains(&name));
+        let services = fs::read_dir(user_folder().join(BOOKS).join("services")).unwrap();
+        let description = services.flatten().map(|entry| entry.path()).find(is_of_topic).unwrap();
+        let permit = |mode| fs::set_permissions(&description, fs::Permissions::from_mode(mode)).unwrap();
+        permit(0o200);
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                thread::sleep(Duration::from_millis(100));
+                permit(0o400);
+            });
+            assert!(Bus::join(&name).unwrap().subscriber::<ForceMessage>(1).is_ok());
+        });
+    }
 
     #[test]
     fn words_of_iceoryx2_come_with_what_to_do() {

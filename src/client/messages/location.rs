@@ -27,7 +27,7 @@ const TEMPORARY: &str = "/tmp";
 const TEMPORARY_NAME: &str = "hexad-";
 
 /// Folder for the files of iceoryx2.
-const BOOKS: &str = "iceoryx2";
+pub(super) const BOOKS: &str = "iceoryx2";
 /// File with the prefix.
 const PREFIX_FILE: &str = "prefix";
 /// Random bytes of a prefix, too many to try.

@@ -37,8 +37,10 @@ fn an_operator_finds_and_stops_all_machines() {
         fs::write(cell.hosts.path(&format!("{k}-network.toml")), network_file(name, &endpoint)).unwrap();
         cell.hosts.start(DAEMONS[k], cell.hosts.hexad(&format!("run --config {k}.toml")));
         let arguments = format!("run {k}-network.toml {k}.toml");
-        cell.hosts.wait_for(DAEMONS[k], "running name");
         cell.hosts.start(BRIDGES[k], cell.hosts.command(Host::Machine, Path::new(BRIDGE), &arguments));
+    }
+    for k in 0..names.len() {
+        cell.hosts.wait_for(DAEMONS[k], "running name");
         cell.hosts.wait_for(BRIDGES[k], "the bridge is open");
     }
     fs::write(cell.hosts.path("fleet.toml"), fleet).unwrap();
