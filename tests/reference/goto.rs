@@ -41,6 +41,7 @@ struct Outcome {
     reached: u32,
     outside: u32,
     ways: u32,
+    unproved: u32,
     /// Refused although the way keeps every bound by [`PROOF_ROOM`].
     for_nothing: u32,
     slowest: f64,
@@ -54,6 +55,7 @@ impl Outcome {
         self.reached += other.reached;
         self.outside += other.outside;
         self.ways += other.ways;
+        self.unproved += other.unproved;
         self.for_nothing += other.for_nothing;
         self.slowest = self.slowest.max(other.slowest);
         self.compared += other.compared;
@@ -135,20 +137,17 @@ fn pair(constants: &Constants, seed: u64) -> Outcome {
         }
         Err(TargetRefusal::Target(bound)) => {
             outcome.outside = 1;
-            assert!(bound.margin < 0.0 && is_outside(constants, &to), "{bound}");
+            assert!(bound.get().margin < 0.0 && is_outside(constants, &to), "{bound}");
         }
         Err(TargetRefusal::Way { bound, share }) => {
             outcome.ways = 1;
             assert!(!is_outside(constants, &to) && (0.0..1.0).contains(&share), "{bound}");
-            if least_room(constants, &from, &to) > PROOF_ROOM {
-                outcome.for_nothing = 1;
-                println!("seed {seed}: refused after {share}: {bound}");
-            }
+            assert!(bound.get().margin < 0.0, "seed {seed}: refused after {share}: {bound}");
         }
-        Err(TargetRefusal::Start(bound)) => {
-            outcome.ways = 1;
+        Err(TargetRefusal::Unproved { bound, share }) => {
+            outcome.unproved = 1;
+            println!("seed {seed}: no stop is proved after {share}: {bound}");
             outcome.for_nothing = u32::from(least_room(constants, &from, &to) > PROOF_ROOM);
-            println!("seed {seed}: refused at its beginning: {bound}");
         }
         Err(refusal @ (TargetRefusal::TooLong(_) | TargetRefusal::Interrupted)) => {
             panic!("seed {seed}: {refusal}")
@@ -198,10 +197,19 @@ fn certificate_a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
         let constants = Constants::new(&config.machine, parameters(&config));
         let pairs = (0..runs).into_par_iter().map(|seed| pair(&constants, seed));
         let outcome = pairs.reduce(Outcome::default, Outcome::merge);
-        let Outcome { reached, outside, ways, for_nothing, slowest, compared, leg_limited, largest } =
-            outcome;
+        let Outcome {
+            reached,
+            outside,
+            ways,
+            unproved,
+            for_nothing,
+            slowest,
+            compared,
+            leg_limited,
+            largest,
+        } = outcome;
         println!(
-            "{name}: {reached} reached, {outside} targets and {ways} ways outside, {for_nothing} for nothing; \
+            "{name}: {reached} reached, {outside} targets and {ways} ways outside, {unproved} unproved, {for_nothing} for nothing; \
              {compared} compared, slowest {slowest:.3}, {leg_limited} limited by legs"
         );
         println!("  {:.4?}", largest.0);

@@ -1,7 +1,9 @@
 //! Poses where the drives are weak: the reference stays where they can hold the platform, takes no more than they can give,
 //! and leaves every pose that it reaches. Forces are those of the inverse dynamics at the reference's own motion.
 
-use hexad::analysis::target_motion::check_target;
+use std::fs;
+
+use hexad::analysis::target_motion::{TargetRefusal, check_target, target_motion};
 use hexad::config::Config;
 use hexad::control::constants::{Constants, MAX_HOLDING_SHARE};
 use hexad::control::reference::ReferenceGenerator;
@@ -11,6 +13,7 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad::model::task::pose_of;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -118,6 +121,68 @@ fn certificate_no_pose_is_reached_that_the_drives_cannot_leave() {
     let largest = searched.into_iter().fold(0.0, f64::max);
     println!("largest share of the force {largest:.4}");
     assert!(largest < 1.0 && largest > 0.9, "{largest}");
+}
+
+/// A shipped machine with drives of this force, and the limits that follow from it.
+fn with_force(name: &str, force: f64) -> Constants {
+    let text = fs::read_to_string(format!("config/{name}.toml")).unwrap();
+    let lines = text.lines().filter(|line| !line.starts_with("max_force_n"));
+    let text: String = lines.map(|line| format!("{line}\n")).collect();
+    let text = text.replace("[actuator]\n", &format!("[actuator]\nmax_force_n = {force:?}\n"));
+    let config = Config::parse(&text, name).unwrap();
+    Constants::new(&config.machine, parameters(&config))
+}
+
+/// A motion to a target among weak poses, for which the drives give less and less acceleration, ends there and not beyond; only a
+/// way that exceeds a bound is refused.
+#[test]
+fn certificate_a_goto_ends_at_its_target_among_weak_poses() {
+    // Of a motion base whose drives hold it with half of their force.
+    let seen = [
+        [0.1245, -0.29928, 0.00202, -0.0532, -0.24927, 1.10295],
+        [-0.06236, 0.16901, -0.10644, 0.10561, 0.00589, 0.91771],
+        [-0.00648, 0.18857, 0.03877, 0.25359, 0.15894, 0.89085],
+    ];
+    let weak = with_force("motion_base", 7600.0);
+    for x in seen {
+        assert!(beyond(&weak, &pose_of(&x)).is_ok_and(|beyond| beyond < 1e-3), "{x:?}");
+    }
+    let certificate = Certificate::new("weak targets", 12 * 20, 12 * 850);
+    let outcomes = (0..certificate.total()).into_par_iter().map(|run| {
+        let (name, share) = (SHIPPED[run as usize % 4], [1.5, 2.0, 3.0][run as usize / 4 % 3]);
+        let at_home = constants(name, None);
+        let home = *at_home.home.pose();
+        let constants = with_force(name, share * held(&at_home.dynamics, &home));
+        let mut random = Random::new(run);
+        let mut vector = |size: f64| Vector3::from_fn(|_, _| random.signed()) * size;
+        let stroke = constants.machine().actuator.stroke();
+        let to = home.displaced(&Twist { angular: vector(0.3), linear: vector(0.4 * stroke) });
+        certificate.advance(1);
+        match beyond(&constants, &to) {
+            Ok(beyond) => {
+                assert!(beyond < 2e-3 * stroke, "{name}, {share}, run {run}: {beyond} m beyond");
+                [1, 0, 0]
+            }
+            Err(TargetRefusal::Target(_)) => [0, 1, 0],
+            Err(TargetRefusal::Way { .. }) => [0, 0, 1],
+            Err(refusal) => panic!("{name}, {share}, run {run}: {refusal}"),
+        }
+    });
+    let [reached, outside, ways] = outcomes.reduce(|| [0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
+    println!("{reached} reached, {outside} targets and {ways} ways outside");
+    assert!(reached > outside / 4, "{reached}");
+}
+
+/// How much farther from its target a motion from home goes after it was nearer \[m\].
+fn beyond(constants: &Constants, to: &Pose) -> Result<f64, TargetRefusal> {
+    let (mut nearest, mut beyond) = (f64::INFINITY, 0.0_f64);
+    target_motion(constants, constants.home.pose(), to, 1.0, |reference, _| {
+        let left = reference.motion().pose.displacement_to(to).linear.norm();
+        nearest = nearest.min(left);
+        beyond = beyond.max(left - nearest);
+        true
+    })?;
+    Ok(beyond)
 }
 
 /// A way from home of a machine: one of 24 directions, every third without rotation. Distances are in arms.

@@ -5,7 +5,7 @@ use hexad_core::control::constants::Constants;
 use hexad_core::control::signals::limits::DerivativeLimits;
 use hexad_core::model::rigid::{Pose, Twist};
 use hexad_core::model::task::pose_of;
-use hexad_machine::analysis::target_motion::{WorkspaceBound, check_target};
+use hexad_machine::analysis::target_motion::{ExceededBound, check_target};
 use hexad_machine::config::coordinates::Coordinates;
 
 /// Age of the reference that is compared with the target \[s\]: of a snapshot on a busy host.
@@ -20,7 +20,7 @@ pub struct JogTarget<'a> {
     /// X of the platform.
     x: [f64; 6],
     /// The last bound that stopped the target.
-    blocked: Option<WorkspaceBound>,
+    blocked: Option<ExceededBound>,
 }
 
 impl<'a> JogTarget<'a> {
@@ -35,7 +35,7 @@ impl<'a> JogTarget<'a> {
     }
 
     /// The bound that stops the target.
-    pub fn blocked(&self) -> Option<WorkspaceBound> {
+    pub fn blocked(&self) -> Option<ExceededBound> {
         self.blocked
     }
 

@@ -16,13 +16,15 @@
 //!
 //! and each of these is attained: a row meets its own direction, and a creeping platform has Coulomb's force either way.
 //! The worst force is the largest `f_i(0)`. The payload is the smallest `p >= 0` at which an `f_i` is the actuator's
-//! limit: f is convex, so Newton's method from beyond the root always converges to it. A closed form by the triangle
+//! limit, or a leg at rest needs the share of it that may be needed to hold the platform (`MAX_HOLDING_SHARE`, as for every
+//! target): f is convex, so Newton's method from beyond the root always converges to it. A closed form by the triangle
 //! inequality would give less than the machine carries.
 //!
 //! Valid at regular poses at rest: velocities add forces that are not included.
 
 use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3, Vector6};
 
+use hexad_core::control::constants::MAX_HOLDING_SHARE;
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::fidelity::Exact;
@@ -78,8 +80,8 @@ pub struct PoseQuality {
     pub condition: f64,
     /// The largest force of any leg under the demanded accelerations; infinite at a singular pose \[N\].
     pub worst_force: f64,
-    /// The largest point mass at the platform's centre of mass that leaves every force within the actuators'
-    /// limit under the demanded accelerations; 0 if it is exceeded without payload, infinite without gravity and acceleration \[kg\].
+    /// The largest point mass at the platform's centre of mass that the actuators can hold as every target must be held, and that leaves
+    /// every force within their limit under the demanded accelerations; 0 if it is exceeded without payload, infinite without gravity and acceleration \[kg\].
     pub payload: f64,
 }
 
@@ -189,8 +191,18 @@ impl LegForceBound {
         (sum, slope)
     }
 
-    /// The smallest mass at which the force is the limit.
+    /// The smallest mass at which the force is the limit, or what may be needed at rest.
     fn payload(&self, limit: f64) -> f64 {
+        let [still, added] = self.still;
+        let held = MAX_HOLDING_SHARE * limit - self.friction;
+        let at_rest =
+            if added == 0.0 { f64::INFINITY } else { (held - still * added.signum()) / added.abs() };
+        let is_held = still.abs() <= held;
+        if is_held { self.payload_in_motion(limit).min(at_rest) } else { 0.0 }
+    }
+
+    /// The smallest mass at which the force under the demanded accelerations is the limit.
+    fn payload_in_motion(&self, limit: f64) -> f64 {
         let [_, still] = self.still;
         let growth = still.abs() + self.angular[1].norm() + self.linear[1].norm();
         let (bare, _) = self.largest(0.0);

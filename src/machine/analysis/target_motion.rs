@@ -34,6 +34,9 @@ const PROGRESS_OF_VELOCITY: f64 = 0.1;
 /// Longest motion that is planned \[s\].
 const LONGEST_S: f64 = 3600.0;
 
+/// Shares of what is left of a way, of position and of orientation, at which its poses are examined.
+const WAY_SAMPLES: u32 = 24;
+
 /// Excess of a bound that is rounding \[m\], \[rad\] or without unit.
 const ROUNDING: f64 = 1e-9;
 
@@ -132,26 +135,61 @@ impl fmt::Display for WorkspaceBound {
     }
 }
 
+/// A bound that is exceeded: it is only made of a value beyond its bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExceededBound(WorkspaceBound);
+
+impl ExceededBound {
+    /// The bound that a pose exceeds most, of the first kind that it does.
+    fn at(constants: &Constants, pose: &Pose) -> Option<Self> {
+        let bounds = workspace_bounds(constants, pose);
+        // NaN is outside.
+        let is_exceeded = |bound: &WorkspaceBound| !(bound.margin >= -ROUNDING);
+        let first = bounds.iter().find(|bound| is_exceeded(bound))?;
+        Some(Self(nearest(&bounds, first.quantity.limit()).filter(is_exceeded).unwrap_or(*first)))
+    }
+
+    /// The bound and the value beyond it.
+    pub fn get(&self) -> &WorkspaceBound {
+        &self.0
+    }
+}
+
+impl fmt::Display for ExceededBound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
 /// Why the reference does not go to a target.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TargetRefusal {
     /// The target is outside of the workspace.
     #[error("the target is outside of the workspace: {0}")]
-    Target(WorkspaceBound),
+    Target(ExceededBound),
     /// The target is inside, the way is not.
     #[error(
         "the straight way to the target leaves the workspace after {percent:.0} %: {bound}; go by another pose, for example --home",
         percent = 100.0 * share
     )]
     Way {
-        /// The bound that ends the way, where it ends.
+        /// The bound that the way exceeds.
+        bound: ExceededBound,
+        /// Share of the way.
+        share: f64,
+    },
+    /// The way exceeds no bound, but passes so near to one that no stop is proved.
+    #[error(
+        "after {percent:.0} % of the straight way to the target no stop within the limits is proved, with this bound as the nearest: {bound}; \
+         go slower (--speed), or by another pose, for example --home",
+        percent = 100.0 * share
+    )]
+    Unproved {
+        /// The nearest bound.
         bound: WorkspaceBound,
         /// Share of the way.
         share: f64,
     },
-    /// No stop within the limits is proved from anywhere on the way to it.
-    #[error("the platform cannot leave its pose within the limits: {0}")]
-    Start(WorkspaceBound),
     /// The motion takes at least so long \[s\].
     #[error(
         "the motion takes {0:.0} s or more, bound {LONGEST_S:.0} s; raise the speed of the request or the limits of velocity, or go in parts"
@@ -205,12 +243,8 @@ fn between(quantity: BoundedQuantity, value: f64, low: f64, high: f64) -> Worksp
 }
 
 /// Whether a pose is in the workspace of the reference; else the bound that it exceeds most, of the first kind that it does.
-pub fn check_target(constants: &Constants, pose: &Pose) -> Result<(), WorkspaceBound> {
-    let bounds = workspace_bounds(constants, pose);
-    // NaN is outside.
-    let exceeded = bounds.iter().find(|bound| !(bound.margin >= -ROUNDING));
-    let Some(first) = exceeded else { return Ok(()) };
-    Err(nearest(&bounds, first.quantity.limit()).unwrap_or(*first))
+pub fn check_target(constants: &Constants, pose: &Pose) -> Result<(), ExceededBound> {
+    ExceededBound::at(constants, pose).map_or(Ok(()), Err)
 }
 
 /// The bound of a limit with the least margin.
@@ -260,7 +294,13 @@ pub fn target_motion(
         }
         stopped_by = stopped_by.union(reference.active_limits());
         if (end_ns - progress_ns) as f64 * 1e-9 > PROGRESS_TIME_S {
-            return Err(ended(constants, &reference.motion().pose, stopped_by, 1.0 - nearest_yet / whole));
+            return Err(ended(
+                constants,
+                &reference.motion().pose,
+                to,
+                stopped_by,
+                1.0 - nearest_yet / whole,
+            ));
         }
     }
     Ok(survey.result(reference.time_ns() as f64 * 1e-9))
@@ -292,15 +332,24 @@ fn distance(from: &Pose, to: &Pose) -> f64 {
     left.linear.norm() / REACHED_M + left.angular.norm() / REACHED_RAD
 }
 
-/// The bound at which the way has ended.
-fn ended(constants: &Constants, pose: &Pose, stopped_by: LimitSet, share: f64) -> TargetRefusal {
+/// Why the way has ended at a pose: a bound that the rest of it exceeds, whichever of position and orientation goes first, or the
+/// nearest of the limits that have stopped it.
+fn ended(constants: &Constants, pose: &Pose, to: &Pose, stopped_by: LimitSet, share: f64) -> TargetRefusal {
+    let left = pose.displacement_to(to);
+    let shares = (0..WAY_SAMPLES * WAY_SAMPLES).map(|k| (k / WAY_SAMPLES, k % WAY_SAMPLES));
+    let poses = shares.map(|(turn, shift)| {
+        let [turn, shift] = [turn, shift].map(|k| f64::from(k) / f64::from(WAY_SAMPLES));
+        pose.displaced(&Twist { angular: left.angular * turn, linear: left.linear * shift })
+    });
+    if let Some(bound) = poses.into_iter().find_map(|pose| ExceededBound::at(constants, &pose)) {
+        return TargetRefusal::Way { bound, share };
+    }
     let bounds = workspace_bounds(constants, pose);
-    let limits = [Limit::Stroke, Limit::Envelope, Limit::Force, Limit::Condition];
+    let limits = [Limit::Force, Limit::Stroke, Limit::Envelope, Limit::Condition];
     let limit = limits.into_iter().find(|limit| stopped_by.contains(*limit)).unwrap_or(Limit::Condition);
     let quantity = BoundedQuantity::Condition;
     let unknown = WorkspaceBound { quantity, value: 0.0, bound: 0.0, margin: 0.0 };
-    let bound = nearest(&bounds, limit).unwrap_or(unknown);
-    if share > 0.0 { TargetRefusal::Way { bound, share } } else { TargetRefusal::Start(bound) }
+    TargetRefusal::Unproved { bound: nearest(&bounds, limit).unwrap_or(unknown), share }
 }
 
 /// Largest quantities on the way.

@@ -18,7 +18,9 @@
 //! **If the stop is proved**, the reference takes the proposed motion and holds the stop ready (`stop`).
 //!
 //! **The drives must be able to make it.** Near a weak pose, or with weak drives, they cannot give the
-//! accelerations of `[limits]`. Proposal and stop then use a share of them, the strength.
+//! accelerations of `[limits]`. Proposal and stop then use a share of them, the strength. A motion of its own is made with
+//! the lesser of its accelerations and that share, and with less velocity: it brakes for a target among weak poses in
+//! time, where the strength falls on the way.
 //!
 //! **On refusal** the proposal is dropped. The refusal names the limit that would be exceeded, or the effort
 //! if it was spent before the proof was complete. The reference follows the held stop for one step. This
@@ -62,8 +64,7 @@ use crate::control::reference::stop::constant_jerk::step_constant_jerk;
 use crate::control::reference::stop::held_stop::HeldStop;
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::setpoint::motion::{RelativeMotion, SetpointMotion};
-use crate::control::setpoint::target::Target;
-use crate::control::setpoint::target::at_rest;
+use crate::control::setpoint::target::{NOTABLY, Target, at_rest};
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::{Limit, LimitSet};
 use crate::control::signals::pair::Pair;
@@ -193,6 +194,14 @@ impl ReferenceGenerator {
         verified.map(drop)
     }
 
+    /// Whether an acceleration is within the strength. Until it is, the stop brakes with more, whatever the
+    /// strength: a further reduction would not help this proof, and only make later stops longer.
+    fn does_strength_act(&self, constants: &Constants, present: &Acceleration) -> bool {
+        let limits = constants.parameters.limits.with_accelerations_scaled(NOTABLY * self.strength);
+        present.linear.norm() <= limits.position.acceleration
+            && present.angular.norm() <= limits.orientation.acceleration
+    }
+
     fn reduce_strength(&mut self) {
         self.strength = (self.strength * STRENGTH_REDUCTION).max(MIN_STRENGTH);
     }
@@ -319,7 +328,11 @@ impl ReferenceGenerator {
             self.stuck_steps = if verified.is_ok() { 0 } else { self.stuck_steps.saturating_add(1) };
             match verified {
                 Ok(_) => self.strength = (self.strength * STRENGTH_GROWTH).min(1.0),
-                Err(Refusal::Limit(Limit::Force)) => self.reduce_strength(),
+                Err(Refusal::Limit(Limit::Force))
+                    if self.does_strength_act(constants, &begin.acceleration) =>
+                {
+                    self.reduce_strength();
+                }
                 // In proportion too, the straight way leads into a bound.
                 Err(Refusal::Limit(Limit::Stroke | Limit::Envelope))
                     if self.stop.is_at_rest() && self.stuck_steps > PROPORTIONAL_STEPS_AFTER_REFUSAL =>
@@ -351,8 +364,8 @@ impl ReferenceGenerator {
         desired: &RelativeMotion,
         h: f64,
     ) -> (Acceleration, u32) {
-        let limits = target.limits(&constants.parameters.limits, &self.motion.acceleration);
-        let limits = limits.with_accelerations_scaled(self.strength);
+        let limits = &constants.parameters.limits;
+        let limits = target.limits(limits, self.strength, &self.motion.acceleration);
         let closing_scale = target.closing_scale(self.closing_scale);
         let approach = |limits| Approach::new(limits, closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));

@@ -27,7 +27,7 @@ pub enum Target<'a> {
 const MIN_TARGET_SPEED: f64 = 0.01;
 
 /// Ratio from which an acceleration is beyond a limit by more than rounding.
-const NOTABLY: f64 = 1.1;
+pub(in crate::control) const NOTABLY: f64 = 1.1;
 
 impl<'a> Target<'a> {
     /// Target that a valid setpoint requests.
@@ -78,18 +78,27 @@ impl<'a> Target<'a> {
         if let Self::Pose { .. } = self { 1.0 } else { scale }
     }
 
-    /// Limits for the way to the target. An acceleration beyond them, such as that of a stop before a bound, ends
-    /// with the whole jerk: with a share of it the platform would bounce off the bound.
-    pub(in crate::control) fn limits(&self, limits: &Limits, present: &Acceleration) -> Limits {
-        let Self::Pose { speed_share, .. } = self else { return *limits };
+    /// Limits for the way to the target, with the share of the accelerations that the drives give. An acceleration
+    /// beyond them, such as that of a stop before a bound, ends with the whole jerk: with a share of it the platform
+    /// would bounce off the bound.
+    pub(in crate::control) fn limits(
+        &self,
+        limits: &Limits,
+        strength: f64,
+        present: &Acceleration,
+    ) -> Limits {
+        let strong = limits.with_accelerations_scaled(strength);
+        let Self::Pose { speed_share, .. } = self else { return strong };
         let mut share = limits.scaled(limits.autonomous_scale * speed_share);
-        for (share, whole, present) in [
-            (&mut share.orientation, &limits.orientation, &present.angular),
-            (&mut share.position, &limits.position, &present.linear),
+        for (share, strong, present) in [
+            (&mut share.orientation, &strong.orientation, &present.angular),
+            (&mut share.position, &strong.position, &present.linear),
         ] {
+            share.velocity *= strength.sqrt();
+            share.acceleration = share.acceleration.min(strong.acceleration);
             let notable = NOTABLY * share.acceleration;
             if present.norm_squared() > notable * notable {
-                share.jerk = whole.jerk;
+                share.jerk = strong.jerk;
             }
         }
         share

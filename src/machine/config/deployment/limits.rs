@@ -160,7 +160,7 @@ fn condition(
     let usual = DEFAULT_CONDITION.max(2.0 * at_home);
     let given = section.has("condition").then(|| section.number_or("condition", usual, Bound::Positive));
     let mut survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
-    let delay_s = (realtime.longest_delay() + MIDDLE_OF_HOLD) * realtime.period_s();
+    let delay_s = (realtime.longest_delay_of_any_release() + MIDDLE_OF_HOLD) * realtime.period_s();
     let is_fast = |pose: &&SurveyedPose| pose.pole * delay_s > MAX_GROWTH_EXPONENT;
     let first_fast = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
     let slow = survey.iter().map(|pose| pose.condition).filter(|condition| *condition < first_fast);

@@ -104,10 +104,16 @@ impl Realtime {
     /// the release, and the force may begin at the next release. Delays of the drives are added to it.
     pub fn longest_delay(&self) -> f64 {
         match self.release {
-            ReleaseMode::Sleep | ReleaseMode::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
+            ReleaseMode::Sleep | ReleaseMode::Hybrid => self.longest_delay_of_any_release(),
             // Released by the measurement itself.
             ReleaseMode::External | ReleaseMode::Lockstep => 1.0,
         }
+    }
+
+    /// The same for whatever releases the loop. The default limits of a machine follow from it: a simulation of the machine has
+    /// the same.
+    pub fn longest_delay_of_any_release(&self) -> f64 {
+        2.0 + self.io_lead_s * self.rate_hz
     }
 
     /// Part of that delay over which the estimator predicts, in periods: the age of the measurement, by its stamp.
