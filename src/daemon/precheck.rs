@@ -1,8 +1,7 @@
 //! Precheck of a trajectory: whether the daemon would follow its setpoints, before the platform moves. The
 //! daemon's own reference generator follows the whole trajectory, cycle by cycle.
 //!
-//! The precheck covers neither forces nor the approach to the first setpoint, which keeps the limits by
-//! construction.
+//! The precheck covers neither the forces of feedback nor the approach to the first setpoint, which keeps the limits by construction.
 
 use core::fmt;
 use core::ops::ControlFlow;
@@ -10,7 +9,7 @@ use core::ops::ControlFlow;
 use nalgebra::Vector6;
 
 use super::parameters::parameters;
-use hexad_core::control::constants::Constants;
+use hexad_core::control::constants::{Constants, MAX_HOLDING_SHARE};
 use hexad_core::control::parameters::{Envelope, Parameters, ViolationPolicy};
 use hexad_core::control::reference::ReferenceGenerator;
 use hexad_core::control::setpoint::motion::SetpointMotion;
@@ -23,6 +22,7 @@ use hexad_core::model::fidelity::Fidelity;
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::drive_capability::DriveCapability;
 use hexad_machine::config::Config;
 
 /// Share of each limit that a built-in motion may use. The rest is a reserve, because a cycle may begin at any instant
@@ -33,17 +33,17 @@ const USABLE_SHARE: f64 = 0.95;
 const CYCLES_PER_REPORT: u64 = 1024;
 
 /// Check of setpoints with the rules and parameters of the daemon.
-pub struct Precheck<'a> {
-    machine: &'a Machine,
+pub struct Precheck {
+    machine: Machine,
     parameters: Parameters,
 }
 
-impl<'a> Precheck<'a> {
+impl Precheck {
     /// Precheck with the limits of the daemon.
-    pub fn new(config: &'a Config) -> Self {
-        let machine = &config.machine;
+    pub fn new(config: &Config) -> Self {
+        let machine = config.machine.clone();
         // The decision about a setpoint does not depend on the fidelity.
-        let parameters = parameters(machine, &config.deployment, Fidelity::Exact);
+        let parameters = parameters(&machine, &config.deployment, Fidelity::Exact);
         Self { machine, parameters }
     }
 
@@ -58,16 +58,20 @@ impl<'a> Precheck<'a> {
             lowest: nearer(lowest),
             highest: nearer(highest),
         });
-        let at_home = KinematicState::new(self.machine, self.machine.home_pose()).sensitivity().condition;
+        let at_home = KinematicState::new(&self.machine, self.machine.home_pose()).sensitivity().condition;
         *condition = at_home + USABLE_SHARE * (*condition - at_home);
+        let drives = DriveCapability::new(&self.machine, &self.machine.home_pose());
+        let available = self.machine.actuator.available_force();
+        let at_home = drives.map_or(0.0, |drives| drives.hardest_held().1 / (MAX_HOLDING_SHARE * available));
+        self.machine.actuator.max_force *= at_home + USABLE_SHARE * (1.0 - at_home);
         self
     }
 
     /// Whether a setpoint keeps the limits at its instant, including the limits of the pose.
     pub fn keeps_limits(&self, state: &TaskState) -> bool {
         let setpoint = SetpointMotion::new(Setpoint::motion(0, *state));
-        let kinematic_state = KinematicState::new(self.machine, setpoint.motion.pose);
-        check_setpoint(self.machine, &self.parameters, &setpoint, &mut LimitSet::default()).is_ok()
+        let kinematic_state = KinematicState::new(&self.machine, setpoint.motion.pose);
+        check_setpoint(&self.machine, &self.parameters, &setpoint, &mut LimitSet::default()).is_ok()
             && kinematic_state.sensitivity().condition <= self.parameters.condition
     }
 
@@ -93,7 +97,7 @@ impl<'a> Precheck<'a> {
         mut refused: impl FnMut(SetpointRefusal) -> ControlFlow<()>,
         mut progress: impl FnMut(f64) -> bool,
     ) {
-        let constants = Constants::new(self.machine, self.parameters);
+        let constants = Constants::new(&self.machine, self.parameters);
         let period_ns = self.parameters.period_ns;
         let setpoint = |k: u64| SetpointMotion::new(Setpoint::motion(k * period_ns, at(self.time(from, k))));
         let mut reference = ReferenceGenerator::new(&constants);
@@ -107,7 +111,7 @@ impl<'a> Precheck<'a> {
                 break;
             }
             let mut active_limits = LimitSet::default();
-            let result = check_setpoint(self.machine, &self.parameters, &now, &mut active_limits)
+            let result = check_setpoint(&self.machine, &self.parameters, &now, &mut active_limits)
                 .and_then(|()| check_deviation(&self.parameters, &reference, &before, &now));
             if let Err(diagnostic) = result {
                 let active_limits = active_limits.union(reference.active_limits());

@@ -2,6 +2,7 @@
 
 use core::iter::repeat_n;
 
+use hexad::analysis::drive_capability::DriveCapability;
 use hexad::analysis::envelope;
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
@@ -12,9 +13,10 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use rayon::prelude::*;
 
-use hexad_support::certificate::cases;
-use hexad_support::deployed;
+use hexad_support::certificate::{Certificate, cases};
+use hexad_support::edited::with_force;
 use hexad_support::rig::Rig;
+use hexad_support::{data, deployed};
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [BuiltInMotion; 5] = [
@@ -52,15 +54,49 @@ fn engage(rig: &mut Rig, task: &TaskState) {
 
 /// Plays a scene, its first instant this part of a cycle after a setpoint.
 fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
+    first_refusal(config, |t| scene.at(t), scene.duration, phase).is_none()
+}
+
+/// The time \[s\] at which a motion is no longer followed, and why.
+fn first_refusal(
+    config: &Config,
+    at: impl Fn(f64) -> TaskState,
+    duration_s: f64,
+    phase: f64,
+) -> Option<(f64, DiagnosticCode)> {
     let mut rig = Rig::new(config, &config.machine);
-    engage(&mut rig, &scene.at(0.0));
+    engage(&mut rig, &at(0.0));
     let period_s = rig.parameters.period_ns as f64 * 1e-9;
-    let cycles = (scene.duration / period_s) as u32 + 10;
-    (0..cycles).all(|k| {
-        let output = rig.cycle(&rig.input(&scene.at((f64::from(k) - phase) * period_s)));
+    let cycles = (duration_s / period_s) as u32 + 10;
+    (0..cycles).map(|k| (f64::from(k) - phase) * period_s).find_map(|t| {
+        let output = rig.cycle(&rig.input(&at(t)));
         let followed = (output.state, output.diagnostic.code) == (State::Active, DiagnosticCode::None);
-        followed && output.missed_setpoints == 0
+        let is_followed = followed && output.missed_setpoints == 0;
+        (!is_followed).then_some((t, output.diagnostic.code))
     })
+}
+
+/// An excitation uses what the drives can give: of weak drives no more than the supervision allows.
+#[test]
+fn certificate_an_excitation_of_weak_drives_is_followed() {
+    let seen =
+        [("motion_base", 7613.829462515296), ("motion_base", 1e4)].map(|(name, n)| with_force(name, n));
+    let tilted = Config::load(&data("tilt36_weak", "toml")).unwrap();
+    let random = (0..60).map(|run: u32| {
+        let name = ["motion_base", "fried2008", "tsai2000", "reference"][run as usize % 4];
+        let machine = with_force(name, 1e6).machine;
+        let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().hardest_held();
+        with_force(name, held * (1.2 + 0.03 * f64::from(run)))
+    });
+    let all: Vec<_> = seen.into_iter().chain([tilted]).chain(random).collect();
+    let count = if Certificate::is_long() { all.len() } else { 3 };
+    all.into_par_iter().take(count).for_each(|config| {
+        let excitation = Trajectory::excitation(&config, 1, 0.7, 0).unwrap();
+        for phase in [0.0, 0.37, 0.5] {
+            let refusal = first_refusal(&config, |t| excitation.at(t), excitation.duration(), phase);
+            assert_eq!(refusal, None, "{} {}", config.name, config.machine.actuator.max_force);
+        }
+    });
 }
 
 /// Slow drives make a motion smaller, to four fifths of their rate and not much less.

@@ -1,8 +1,6 @@
 //! Poses where the drives are weak: the reference stays where they can hold the platform, takes no more than they can give,
 //! and leaves every pose that it reaches. Forces are those of the inverse dynamics at the reference's own motion.
 
-use std::fs;
-
 use hexad::analysis::target_motion::{TargetRefusal, check_target, target_motion};
 use hexad::config::Config;
 use hexad::control::constants::{Constants, MAX_HOLDING_SHARE};
@@ -18,6 +16,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use hexad_support::certificate::Certificate;
+use hexad_support::edited::with_force;
 use hexad_support::rig::parameters;
 
 const SHIPPED: [&str; 4] = ["motion_base", "fried2008", "tsai2000", "reference"];
@@ -123,16 +122,6 @@ fn certificate_no_pose_is_reached_that_the_drives_cannot_leave() {
     assert!(largest < 1.0 && largest > 0.9, "{largest}");
 }
 
-/// A shipped machine with drives of this force, and the limits that follow from it.
-fn with_force(name: &str, force: f64) -> Constants {
-    let text = fs::read_to_string(format!("config/{name}.toml")).unwrap();
-    let lines = text.lines().filter(|line| !line.starts_with("max_force_n"));
-    let text: String = lines.map(|line| format!("{line}\n")).collect();
-    let text = text.replace("[actuator]\n", &format!("[actuator]\nmax_force_n = {force:?}\n"));
-    let config = Config::parse(&text, name).unwrap();
-    Constants::new(&config.machine, parameters(&config))
-}
-
 /// A motion to a target among weak poses, for which the drives give less and less acceleration, ends there and not beyond; only a
 /// way that exceeds a bound is refused.
 #[test]
@@ -143,7 +132,8 @@ fn certificate_a_goto_ends_at_its_target_among_weak_poses() {
         [-0.06236, 0.16901, -0.10644, 0.10561, 0.00589, 0.91771],
         [-0.00648, 0.18857, 0.03877, 0.25359, 0.15894, 0.89085],
     ];
-    let weak = with_force("motion_base", 7600.0);
+    let constants_of = |config: Config| Constants::new(&config.machine, parameters(&config));
+    let weak = constants_of(with_force("motion_base", 7600.0));
     for x in seen {
         assert!(beyond(&weak, &pose_of(&x)).is_ok_and(|beyond| beyond < 1e-3), "{x:?}");
     }
@@ -152,7 +142,7 @@ fn certificate_a_goto_ends_at_its_target_among_weak_poses() {
         let (name, share) = (SHIPPED[run as usize % 4], [1.5, 2.0, 3.0][run as usize / 4 % 3]);
         let at_home = constants(name, None);
         let home = *at_home.home.pose();
-        let constants = with_force(name, share * held(&at_home.dynamics, &home));
+        let constants = constants_of(with_force(name, share * held(&at_home.dynamics, &home)));
         let mut random = Random::new(run);
         let mut vector = |size: f64| Vector3::from_fn(|_, _| random.signed()) * size;
         let stroke = constants.machine().actuator.stroke();

@@ -26,6 +26,13 @@ pub fn set(table: &mut Table, section: &str, key: &str, value: impl Into<Value>)
     section.as_table_mut().unwrap().insert(key.into(), value.into());
 }
 
+/// A machine of `config` with drives of this force \[N\], and the limits that follow from it.
+pub fn with_force(name: &str, force_n: f64) -> Config {
+    let mut table = deployed_table(name);
+    set(&mut table, "actuator", "max_force_n", force_n);
+    config(&table)
+}
+
 /// Validates an edited table.
 pub fn config(table: &Table) -> Config {
     let text = table.to_string();
