@@ -117,6 +117,9 @@
 //! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |
 //! | work frame | frame fixed in the base, in which the pose of a tool is given |
 
+// A closed pipe must not end a command: these macros panic.
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+
 pub use hexad_client::{messages, operator, realtime};
 pub use hexad_core::{control, model, motion, plant};
 pub use hexad_daemon as daemon;

@@ -8,6 +8,9 @@
 //!
 //! The cyclic loop is here because it is generic: it knows no message and no controller, and a driver may run in it as well.
 
+// A closed pipe must not end a command: these macros panic.
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+
 pub mod messages;
 pub mod operator;
 pub mod realtime;

@@ -17,6 +17,7 @@ use hexad_core::model::rigid::Twist;
 use hexad_machine::analysis::assembly_modes::other_permitted_modes;
 use hexad_machine::text::csv_table::{NumberTable, legs, length_columns, six};
 use hexad_machine::text::csv_writer::CsvWriter;
+use hexad_machine::text::files::remark;
 
 /// Share of the stroke by which measured lengths may be beyond it: platforms park at its ends.
 const STROKE_TOLERANCE: f64 = 0.01;
@@ -52,11 +53,11 @@ impl ForwardKinematicsArguments {
         let PoseTable { mut output, solved, unique } =
             forward_kinematics(&machine, self.start, self.files.rotation, &table);
         output.save(&self.files.output).map_err(Failure::before_start)?;
-        if let Some(remark) = stroke_remark(&machine, &table) {
-            eprintln!("hexad: {remark}");
+        if let Some(text) = stroke_remark(&machine, &table) {
+            remark(text);
         }
         match unique {
-            Err(remark) if !self.strict || solved.is_err() => eprintln!("hexad: {remark}"),
+            Err(text) if !self.strict || solved.is_err() => remark(text),
             unique => unique?,
         }
         Ok(solved?)

@@ -87,7 +87,9 @@ impl SetArguments {
         let frames = config.frames_named(self.frames.tool.as_deref(), self.frames.work.as_deref())?;
         let answer = status(&config.name)?;
         let seen = Observation::of_answer(&answer, 0, &config.machine.home);
-        let here = seen.and_then(|seen| seen.reference).ok_or(TargetError::UnknownPose(answer.text))?;
+        let here = seen
+            .and_then(|seen| seen.reference)
+            .ok_or(TargetError::UnknownPose(answer.text.as_str().into()))?;
         let x = task_coordinates(&frame_here(&frames, kind, &pose_of(&here)), &[0.0; 6]);
         let text = with_frame(&config.text, &NamedFrame { name: self.name, kind, x })?;
         Config::parse(&text, "the new machine file")?;

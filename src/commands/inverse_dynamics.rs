@@ -13,6 +13,7 @@ use hexad_core::model::fidelity::Fidelity;
 use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::joint_space::{LegDynamics, joint_space};
 use hexad_core::model::machine::Machine;
+use hexad_core::model::transmission::Transmission;
 use hexad_machine::analysis::batch;
 use hexad_machine::text::csv_table::{NumberTable, legs};
 use hexad_machine::text::csv_writer::CsvWriter;
@@ -67,7 +68,7 @@ fn fidelity_by_name() -> impl TypedValueParser<Value = Fidelity> {
     })
 }
 
-/// Forces, lengths and their derivatives for a table with the columns of a trajectory, and whether all rows are solved. At a singular
+/// Forces of the legs, lengths and their derivatives, and commands of the drives for a table with the columns of a trajectory, and whether all rows are solved. At a singular
 /// pose the forces are NaN. `is_joint_space`: the columns of `JOINT_SPACE` follow, NaN for a leg along its universal axis.
 pub fn inverse_dynamics(
     machine: &Machine,
@@ -77,7 +78,7 @@ pub fn inverse_dynamics(
 ) -> (CsvWriter, Result<(), UnsolvedRows>) {
     let added = if is_joint_space { &JOINT_SPACE[..] } else { &[] };
     let mut columns = vec!["t".into()];
-    let stems = ["force", "length", "length_rate", "length_accel"].into_iter();
+    let stems = ["force", "length", "length_rate", "length_accel", "drive_command"].into_iter();
     columns.extend(stems.chain(added.iter().map(|(stem, _)| *stem)).flat_map(legs));
     let motions: Vec<_> = table.rows().iter().map(|row| task_state(row).motion()).collect();
     let mut forces = vec![None; motions.len()];
@@ -95,7 +96,9 @@ pub fn inverse_dynamics(
         let dynamics = joint_space(machine, motion, &forces);
         let joint_values: Vec<_> = added.iter().flat_map(|(_, of)| dynamics.iter().map(of)).collect();
         unsolved.add(time(row), forces.iter().chain(&joint_values).all(|value| value.is_finite()));
+        let commands = Transmission::new(&machine.actuator, &motions.rate).commands(&forces);
         let known = forces.into_iter().chain(motions.length).chain(motions.rate).chain(motions.accel);
+        let known = known.chain(commands);
         writer.row([time(row)].into_iter().chain(known).chain(joint_values));
     }
     (writer, unsolved.into_result())

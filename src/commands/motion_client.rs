@@ -11,6 +11,7 @@ use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult};
 use hexad_client::operator::requests::connect;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::State;
+use hexad_machine::text::files::remark;
 
 /// Longest wait for an answer that the daemon gives at once, and for a platform that comes to rest.
 const ANSWER_LIMIT: Duration = Duration::from_secs(5);
@@ -81,7 +82,7 @@ impl<'a> MotionClient<'a> {
             let until = Instant::now() + ANSWER_LIMIT;
             match self.connection.receive(until, || self.stop.is_requested())? {
                 Some(answer) if answer.result == RequestResult::Waiting => {
-                    eprintln!("hexad: waiting: {}", answer.text);
+                    remark(format_args!("waiting: {}", answer.text));
                 }
                 Some(answer) if answer.result == RequestResult::Accepted => begun(&answer.text)?,
                 Some(answer) => return completed(answer),

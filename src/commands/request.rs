@@ -19,7 +19,7 @@ use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::Request;
 use hexad_machine::config::ConfigError;
 use hexad_machine::config::machine_name::name_in;
-use hexad_machine::text::files::print;
+use hexad_machine::text::files::{print, remark};
 
 #[derive(Debug, Args)]
 pub struct RequestArguments {
@@ -81,7 +81,7 @@ impl RequestArguments {
     fn send(&self, request: Request, is_patient: bool, pose: Option<u32>) -> Result<(), Failure> {
         let (machine, stop) = (machine_name(self.machine.path())?, Stop::on_signals()?);
         let order = Order { is_patient, pose, ..Order::new(request, self.wait.limit()) };
-        let waits = |reason: &str| eprintln!("hexad: waiting: {reason}");
+        let waits = |reason: &str| remark(format_args!("waiting: {reason}"));
         let state = carry_out(&machine, &order, &|| stop.is_requested(), waits)?;
         Ok(print(format_args!("{state}\n"))?)
     }
@@ -116,7 +116,7 @@ fn report(stopped: Vec<Stopped>, with_names: bool) -> Result<(), Failure> {
     let may_any = stopped.iter().any(|it| it.result.as_ref().err().is_none_or(is_answer));
     let mut failures = vec![];
     for Stopped { machine, result, remarks } in stopped {
-        remarks.iter().for_each(|remark| eprintln!("hexad: {remark}"));
+        remarks.iter().for_each(remark);
         match result {
             Ok(state) if with_names => print(format_args!("{machine}: {state}\n"))?,
             Ok(state) => print(format_args!("{state}\n"))?,
@@ -126,7 +126,7 @@ fn report(stopped: Vec<Stopped>, with_names: bool) -> Result<(), Failure> {
     let counts = |error: &OperatorError| is_answer(error) || !may_any;
     let first = failures.iter().position(|(_, error)| counts(error));
     let last = first.map(|place| failures.swap_remove(place));
-    failures.iter().for_each(|(machine, error)| eprintln!("hexad: {machine}: {error}"));
+    failures.iter().for_each(|(machine, error)| remark(format_args!("{machine}: {error}")));
     last.map_or(Ok(()), |(_, error)| Err(error.into()))
 }
 

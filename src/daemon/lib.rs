@@ -5,6 +5,9 @@
 //! I/O thread publishes it; the log thread empties its queues; the recorder completes its files; the report
 //! is written.
 
+// A closed pipe must not end a command: these macros panic.
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+
 use std::io;
 use std::path::PathBuf;
 

@@ -16,11 +16,13 @@ use hexad_core::control::setpoint::motion::SetpointMotion;
 use hexad_core::control::setpoint::target::Target;
 use hexad_core::control::setpoint::validation::{check_deviation, check_setpoint};
 use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad_core::control::signals::errors::PoseError;
 use hexad_core::control::signals::inputs::Setpoint;
 use hexad_core::control::signals::limits::{Limit, LimitSet};
 use hexad_core::model::fidelity::Fidelity;
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::machine::Machine;
+use hexad_core::model::rigid::Motion;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::drive_capability::DriveCapability;
 use hexad_machine::config::Config;
@@ -28,6 +30,9 @@ use hexad_machine::config::Config;
 /// Share of each limit that a built-in motion may use. The rest is a reserve, because a cycle may begin at any instant
 /// between two setpoints.
 const USABLE_SHARE: f64 = 0.95;
+
+/// Share of the largest distance of the setpoints from the first, of which the reference must go as much.
+const LEAST_MOVED_SHARE: f64 = 0.5;
 
 /// Cycles between two reports of progress: about a millisecond of effort.
 const CYCLES_PER_REPORT: u64 = 1024;
@@ -106,9 +111,13 @@ impl Precheck {
         reference.verify_start(&constants, &now.motion).ok();
         reference.begin_placed_motion(0);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
+        let tolerance = |a: &Motion, b: &Motion| {
+            self.parameters.engage_tolerance_ratio(&PoseError::new(a, &b.pose, &b.twist))
+        };
+        let (start, mut wanted, mut moved) = (now.motion, 0.0_f64, 0.0_f64);
         for k in 0..=steps {
             if k % CYCLES_PER_REPORT == 0 && !progress(self.time(0.0, k)) {
-                break;
+                return;
             }
             let mut active_limits = LimitSet::default();
             let result = check_setpoint(&self.machine, &self.parameters, &now, &mut active_limits)
@@ -118,13 +127,22 @@ impl Precheck {
                 let policy = self.parameters.on_violation;
                 let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits, policy };
                 if refused(refusal).is_break() {
-                    break;
+                    return;
                 }
                 reference.verify_start(&constants, &now.motion).ok();
                 reference.begin_placed_motion(k * period_ns);
             }
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
+            wanted = wanted.max(tolerance(&now.motion, &start));
+            moved = moved.max(tolerance(reference.motion(), &start));
             (before, now) = (now, setpoint(k + 1));
+        }
+        // Within the tolerance a reference that never moves would count as one that follows.
+        if moved < LEAST_MOVED_SHARE * wanted {
+            let diagnostic = Diagnostic::new(DiagnosticCode::SetpointBeyondLimits, wanted, 1.0);
+            let active_limits = reference.active_limits();
+            let policy = self.parameters.on_violation;
+            let _ = refused(SetpointRefusal { t: to, diagnostic, active_limits, policy });
         }
     }
 

@@ -10,6 +10,7 @@ use tracing::warn;
 
 use super::{DaemonError, nanoseconds};
 use hexad_client::realtime::cyclic::ReleaseMode;
+use hexad_client::realtime::setup::budget::GroupBudget;
 use hexad_client::realtime::setup::deadline::Reservation;
 use hexad_client::realtime::setup::idle::PmQosRequest;
 use hexad_client::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
@@ -39,6 +40,7 @@ pub(super) fn start(
     }
     let mut pm_qos = None;
     if !realtime.is_simulated() {
+        shortfalls.extend(GroupBudget::of_this_process().shortfall(realtime.needed_share()));
         pm_qos = idle::limit_wakeup_latency(realtime.cpu_dma_latency_us)
             .map_err(|shortfall| shortfalls.push(shortfall))
             .ok();

@@ -7,6 +7,9 @@
 //! | [`config`] | machine and deployment files |
 //! | [`log`] | the log of a program |
 
+// A closed pipe must not end a command: these macros panic.
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+
 pub mod analysis;
 pub mod config;
 pub mod log;

@@ -195,7 +195,7 @@ fn singular_homes_are_refused() {
     let stroke = "min_length_m = 0.85\nmax_length_m = 1.6";
     let at = |pose: &str| {
         fried_with(home, pose)
-            .replace(stroke, "min_length_m = 0.01\nmax_length_m = 16.0")
+            .replace(stroke, "min_length_m = 0.16\nmax_length_m = 16.0")
             .replace("axial_inertia_kg_m2 = 0.0013", "axial_inertia_kg_m2 = 0.001")
     };
     // Fichter's: turned by a quarter about the vertical; and all legs in one plane.

@@ -226,6 +226,46 @@ fn values_that_are_wrong_by_a_thousand_are_warned_of() {
     }
 }
 
+/// What releases, schedules or simulates the loop is no property of the machine: no file becomes invalid by it, and none has other limits.
+#[test]
+fn keys_of_running_change_neither_validity_nor_limits() {
+    let keys: [(&str, &str, toml::Value); 8] = [
+        ("realtime", "release", "lockstep".into()),
+        ("realtime", "scheduler", "deadline".into()),
+        ("realtime", "priority", 50.into()),
+        ("realtime", "io_priority", 40.into()),
+        ("realtime", "lock_memory", false.into()),
+        ("realtime", "late_wakeup_us", 500.0.into()),
+        ("plant.sensor", "length_noise_m", 1e-7.into()),
+        ("setpoint", "on_violation", "limit".into()),
+    ];
+    let files = others().chain(built()).chain([FRIED, MOTION_BASE, TSAI].map(String::from));
+    for file in files.chain([data("pocket"), data("pocket").replace("1.7918649518056304", "9.0")]) {
+        let of = |config: &Config| (text(&config.examine().errors), config.deployment.limits.clone());
+        let plain = of(&load(&file));
+        for (section, key, value) in &keys {
+            let mut table: toml::Table = file.parse().unwrap();
+            let mut inner = &mut table;
+            for part in section.split('.') {
+                let part = inner.entry(part).or_insert_with(|| toml::Table::new().into());
+                inner = part.as_table_mut().unwrap();
+            }
+            inner.insert((*key).into(), value.clone());
+            let with = of(&load(&table.to_string()));
+            assert_eq!(with, plain, "[{section}] {key} = {value} in {:.40}", file.lines().last().unwrap());
+        }
+    }
+}
+
+#[test]
+fn a_leg_that_may_become_as_short_as_nothing_is_refused_because_it_could_not_move() {
+    let error =
+        Config::parse(&base_with("min_length_m = 1.1", "min_length_m = 1e-6"), "x").unwrap_err().to_string();
+    for words in ["actuator.min_length_m = 1e-6", "at least 0.023", "the length at the end stop"] {
+        assert!(error.contains(words), "{error}");
+    }
+}
+
 /// A long stroke admits home in either order of its angles and positions, also where the other order is singular.
 #[test]
 fn angles_after_positions_are_named_where_the_stroke_admits_both() {

@@ -27,7 +27,7 @@ fn check(name: &str, options: &[&str], forces: &str) {
     let ran = hexad_on_vectors("inverse-dynamics", name, options);
     let ours = ran.table();
     assert_eq!(ran.message, "", "nothing to complain about");
-    let columns = six_each(&["force", "length", "length_rate", "length_accel"]);
+    let columns = six_each(&["force", "length", "length_rate", "length_accel", "drive_command"]);
     assert_eq!(ours.header, [with_t(&[]), columns].concat());
     assert_eq!(ours.rows.len(), reference.rows.len());
     for (a, b) in ours.rows.iter().zip(&reference.rows) {
@@ -35,6 +35,8 @@ fn check(name: &str, options: &[&str], forces: &str) {
     }
     let what = format!("{name} {}", options.join(" "));
     compare(&ours, &reference, ["force", forces], FORCE_BOUND, &what);
+    // The machines of the vectors lose nothing between drive and leg.
+    compare(&ours, &reference, ["drive_command", forces], FORCE_BOUND, &what);
     for stem in ["length_rate", "length_accel"] {
         compare(&ours, &reference, [stem, stem], KINEMATICS_BOUND, &what);
     }

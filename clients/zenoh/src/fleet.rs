@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use hexad_client::operator::protocol::{AnswerLine, RequestResult};
 use hexad_core::control::signals::state::Request;
-use hexad_machine::text::files::print;
+use hexad_machine::text::files::{print, remark};
 use hexad_machine::text::numbers::significant;
 use hexad_machine::text::text_table::{Left, Right, text_table};
 use serde::Deserialize;
@@ -163,5 +163,5 @@ impl FleetFile {
 /// Prints the failures; returns their number.
 fn report_failures(outcomes: &[Outcome<'_>]) -> usize {
     let failures = outcomes.iter().filter_map(|(name, outcome)| Some((name, outcome.as_ref().err()?)));
-    failures.inspect(|(name, error)| eprintln!("hexad: {name}: {error}")).count()
+    failures.inspect(|(name, error)| remark(format_args!("{name}: {error}"))).count()
 }

@@ -27,7 +27,7 @@ use hexad_daemon::recording::RecordingError;
 use hexad_daemon::report::Report;
 use hexad_machine::config::text::read_file;
 use hexad_machine::config::{Config, ConfigError};
-use hexad_machine::text::files::{FileError, print, write_whole};
+use hexad_machine::text::files::{FileError, print, remark, write_whole};
 
 pub mod children;
 mod pictures;
@@ -130,7 +130,7 @@ fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     let page = stage.write_page(&demo.charts);
     let recording = performed.inspect_err(|_| {
         if let Ok(page) = &page {
-            eprintln!("hexad: report: {}", page.display());
+            remark(format_args!("report: {}", page.display()));
         }
     })?;
 

@@ -53,7 +53,7 @@ impl Summary<'_> {
         };
         text_table(
             2,
-            &[("tracking", Left), ("RMS", Right), ("max", Right)],
+            &[("setpoint less true pose", Left), ("RMS", Right), ("max", Right)],
             [
                 row("  position", "µm", tracking.position_rms_m, tracking.position_max_m),
                 row("  orientation", "µrad", tracking.orientation_rms_rad, tracking.orientation_max_rad),

@@ -72,7 +72,7 @@ fn tracking(history: &History) -> Fact {
         "never active".into()
     } else {
         format!(
-            "position {} RMS, {} largest; orientation {} RMS, {} largest (state active)",
+            "position {} RMS, {} largest; orientation {} RMS, {} largest (reference less estimated pose, in state active)",
             scaled(tracking.position_rms_m, "m"),
             scaled(tracking.position_max_m, "m"),
             scaled(tracking.orientation_rms_rad, "rad"),

@@ -22,7 +22,7 @@ use hexad_client::operator::users::user_name;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_machine::config::Config;
 use hexad_machine::config::coordinates::Coordinates;
-use hexad_machine::text::files::print;
+use hexad_machine::text::files::{print, remark};
 
 mod live;
 mod server;
@@ -73,7 +73,7 @@ impl ViewArguments {
         let live = Mutex::new(Live::new(&config, coordinates.clone()));
         let server = Server::start(self.port).map_err(|cause| ViewError { port: self.port, cause })?;
         print(format_args!("{}\n", server.address()))?;
-        eprintln!("hexad: open this address in a browser on this host; Ctrl-C ends it");
+        remark("open this address in a browser on this host; Ctrl-C ends it");
         std::thread::scope(|scope| {
             for _ in 0..server::THREADS {
                 scope.spawn(|| {

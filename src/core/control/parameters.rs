@@ -98,7 +98,7 @@ impl Parameters {
 
     /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided
     /// by `wn = sqrt(Kp)`, so that it compares with a pose error.
-    pub(super) fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
+    pub fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
         let Self { law, engage_position, engage_orientation, .. } = self;
         let PoseError { pose, twist } = error;
         largest_ratio([

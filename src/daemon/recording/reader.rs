@@ -14,7 +14,7 @@ use super::{CYCLE, Damage, GAP, Item, MEMORY, RecordingError, RunInfo};
 use hexad_client::messages::cdr;
 use hexad_client::messages::layout::Declared as _;
 use hexad_client::messages::{CycleMessage, GapMessage};
-use hexad_machine::text::files::FileError;
+use hexad_machine::text::files::{FileError, remark};
 
 /// Most bytes that are read at once: a chunk. A damaged length cannot demand more.
 const READ_BYTES: usize = 128 * 1024;
@@ -137,9 +137,9 @@ impl Recording {
     pub fn remark(&self, summary: &Summary) {
         if let Some(why) = &summary.unfinished {
             let path = self.path.display();
-            eprintln!(
-                "hexad: {path}: it is not complete ({why}): cycles at its end may be missing; hexad recover completes it"
-            );
+            remark(format_args!(
+                "{path}: it is not complete ({why}): cycles at its end may be missing; hexad recover completes it"
+            ));
         }
     }
 

@@ -175,13 +175,15 @@ struct Section {
 }
 
 impl Section {
-    /// Columns of all fields but the excluded ones. Lengths and forces have the names of the other tables: without unit, in SI.
+    /// Columns of all fields but the excluded ones. Lengths and forces have the names of the other tables: without unit, in SI. A
+    /// force that is sent is the command of the drive, one that is measured the force of the leg.
     fn new(layout: &Layout, prefix: &str, excluded: &[&str]) -> Self {
         let is_of = |name: &str, field: &str| {
             name.strip_prefix(field).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))
         };
+        let force = if prefix.is_empty() { "drive_command_" } else { "force_" };
         let without_unit = |name: String| {
-            [("length_m_", "length_"), ("length_rate_m_s_", "length_rate_"), ("force_n_", "force_")]
+            [("length_m_", "length_"), ("length_rate_m_s_", "length_rate_"), ("force_n_", force)]
                 .iter()
                 .find_map(|(from, to)| Some(format!("{to}{}", name.strip_prefix(from)?)))
                 .unwrap_or(name)

@@ -46,16 +46,16 @@ pub enum TargetError {
     OtherSource(String),
     /// The platform does not stand under control.
     #[error("the platform is not under control (state {state}: {1}); engage takes control", state = .0.name())]
-    NotInControl(State, String),
+    NotInControl(State, Reason),
     /// No pose is measured.
     #[error("the pose of the platform is unknown: {0}")]
-    UnknownPose(String),
+    UnknownPose(Reason),
     /// The daemon has another setpoint.
     #[error("the daemon does not follow this target, but another setpoint: does another source run?")]
     NotFollowed,
     /// An operator or a fault has ended control.
     #[error("control has ended: the daemon is in {state}: {1}", state = .0.name())]
-    Ended(State, String),
+    Ended(State, Reason),
     /// The daemon does not answer.
     #[error("control has ended: {0}")]
     NoAnswer(String),
@@ -87,6 +87,24 @@ impl TargetError {
                 RequestResult::Failed
             }
         }
+    }
+}
+
+/// Reason of a refusal: what the daemon says of its state, and never an empty text.
+#[derive(Clone, Debug)]
+pub struct Reason(String);
+
+impl From<&str> for Reason {
+    fn from(text: &str) -> Self {
+        let without_fault =
+            "the daemon reports no fault: is the driver, or in simulated time a source, started?";
+        Self(if text.is_empty() { without_fault } else { text }.into())
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
     }
 }
 

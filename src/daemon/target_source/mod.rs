@@ -126,7 +126,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
         let (now, _) = feed.observe()?;
         let is_active = now.state == State::Active;
         if !is_active && !may_engage {
-            return Err(TargetError::NotInControl(now.state, now.text.clone()));
+            return Err(TargetError::NotInControl(now.state, now.text.as_str().into()));
         }
         let mut setpoints: Publisher<SetpointMessage> = bus.publisher()?;
         setpoints.begin_epoch();
@@ -158,7 +158,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     /// X of the reference or of the platform now.
     pub fn present_x(&mut self) -> Result<[f64; 6], TargetError> {
         let (now, _) = self.feed.observe()?;
-        now.reference.ok_or_else(|| TargetError::UnknownPose(now.text.clone()))
+        now.reference.ok_or_else(|| TargetError::UnknownPose(now.text.as_str().into()))
     }
 
     /// X at which the platform comes to rest if it brakes now with the limits of autonomous motions. The
@@ -166,7 +166,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     pub fn resting_x(&mut self, constants: &Constants) -> Result<[f64; 6], TargetError> {
         let (newest, before) = self.feed.observe()?;
         let of = |observation: &Observation| Some(pose_of(&observation.reference?));
-        let now = of(newest).ok_or_else(|| TargetError::UnknownPose(newest.text.clone()))?;
+        let now = of(newest).ok_or_else(|| TargetError::UnknownPose(newest.text.as_str().into()))?;
         let earlier = before.and_then(|before| {
             let interval_s = seconds(before.time_ns, newest.time_ns);
             Some((of(before)?, interval_s))
@@ -248,7 +248,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
             return Ok(());
         }
         if !now.state.follows() {
-            return Err(TargetError::Ended(now.state, now.text.clone()));
+            return Err(TargetError::Ended(now.state, now.text.as_str().into()));
         }
         // An older observation has another setpoint.
         let is_late = monotonic_ns().saturating_sub(published_ns.max(since_ns)) > FOLLOWING_LIMIT_NS;

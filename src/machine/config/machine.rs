@@ -23,6 +23,10 @@ const FRICTION_UNCERTAINTY: &str = "friction_uncertainty_n";
 const USUAL_FRICTION_PER_MAX_FORCE: f64 = 0.03;
 const USUAL_FRICTION_PER_HOLDING: f64 = 0.2;
 
+/// Least length of a leg as a share of its largest. Forces and accelerations of a leg that turns are as 1 / length: below a
+/// thousandth no motion is proved (2026-11-29: three machines).
+const LEAST_LENGTH_RATIO: f64 = 0.01;
+
 /// Largest load friction: of a lead screw that hardly turns under load.
 const MAX_LOAD_FRICTION: f64 = 0.8;
 /// A drive that gives less than half or more than twice of what it is told has a wrong unit.
@@ -138,6 +142,15 @@ fn actuator(mut section: SectionReader) -> Actuator {
     if actuator.max_length <= actuator.min_length {
         let bound = format!("must be greater than {} (actuator.min_length_m)", actuator.min_length);
         section.reject("max_length_m", bound);
+    }
+    let least = LEAST_LENGTH_RATIO * actuator.max_length;
+    if actuator.min_length < least {
+        let bound = format!(
+            "must be at least {} (a hundredth of actuator.max_length_m): give the length at the end stop; every stop is proved for legs as \
+             short as this, and for shorter ones none is",
+            rounded(least)
+        );
+        section.reject("min_length_m", bound);
     }
     section.finish();
     actuator

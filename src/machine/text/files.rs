@@ -36,6 +36,11 @@ pub fn print(text: impl fmt::Display) -> Result<(), FileError> {
     }
 }
 
+/// Writes a line to standard error. Nobody who reads it is no error.
+pub fn remark(text: impl fmt::Display) {
+    let _ = writeln!(io::stderr(), "hexad: {text}");
+}
+
 /// Path that means standard input or output.
 const STANDARD: &str = "-";
 

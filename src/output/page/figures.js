@@ -30,7 +30,7 @@ const FIGURES = [
     { label: "force [N]", names: LEGS, signal: "force", reference: "force_ref" },
     { label: "difference [N]", names: LEGS, signal: "force_difference" },
   ] },
-  { title: "Tracking error: reference less platform", panels: [
+  { title: "Tracking error: reference less estimated platform", panels: [
     { label: "position [m]", names: ["distance"], signal: "position_error" },
     { label: "orientation [rad]", names: ["angle"], signal: "orientation_error", color: 1 },
   ] },

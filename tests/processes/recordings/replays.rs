@@ -134,7 +134,7 @@ fn a_window_becomes_a_table(machine: &Machine, window: &Path) {
     let columns: Vec<_> = text.lines().next().unwrap().split(',').collect();
     let place = |name: &str| columns.iter().position(|column| *column == name).expect(name);
     let [cycle, t, code, force, length] =
-        ["cycle", "t", "diagnostic_code", "force_6", "measured_length_6"].map(place);
+        ["cycle", "t", "diagnostic_code", "drive_command_6", "measured_length_6"].map(place);
     let rows: Vec<Vec<f64>> = text
         .lines()
         .skip(1)

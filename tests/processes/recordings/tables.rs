@@ -54,7 +54,7 @@ fn computed(machine: &Machine, command: &str, input: &Path, more: &[&str]) -> Ta
 
 /// Forces of a row \[N\].
 fn forces(table: &Table, row: usize) -> [f64; 6] {
-    core::array::from_fn(|k| table[&format!("force_{}", k + 1)][row].parse().expect("a force"))
+    core::array::from_fn(|k| table[&format!("drive_command_{}", k + 1)][row].parse().expect("a force"))
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {

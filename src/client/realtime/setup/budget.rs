@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::Shortfall;
+
 /// Real-time budget of the cgroup of this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GroupBudget {
@@ -12,8 +14,10 @@ pub enum GroupBudget {
     Limited {
         /// The file that sets it.
         file: PathBuf,
-        /// Per period.
+        /// Per period. Negative: all of it.
         budget_us: i64,
+        /// The period.
+        period_us: i64,
     },
     /// A group of cgroup v2, which has no file for it: a kernel with such budgets gives it none.
     Unknown {
@@ -29,13 +33,36 @@ impl GroupBudget {
             .map(|path| fs::read_to_string(path).unwrap_or_default());
         if let Some(folder) = folder(&groups, &mounts, Hierarchy::Cpu) {
             let file = folder.join("cpu.rt_runtime_us");
-            let budget_us = fs::read_to_string(&file).ok().and_then(|text| text.trim().parse().ok());
-            return budget_us.map_or(Self::Unlimited, |budget_us| Self::Limited { file, budget_us });
+            let read = |file: &Path| fs::read_to_string(file).ok()?.trim().parse().ok();
+            let period_us = read(&folder.join("cpu.rt_period_us")).unwrap_or(USUAL_PERIOD_US);
+            let limited = |budget_us| Self::Limited { file: file.clone(), budget_us, period_us };
+            return read(&file).map_or(Self::Unlimited, limited);
         }
         // The root group alone has no type.
         folder(&groups, &mounts, Hierarchy::Unified)
             .filter(|folder| folder.join("cgroup.type").exists())
             .map_or(Self::Unlimited, |group| Self::Unknown { group })
+    }
+}
+
+/// Period of the kernel's default.
+const USUAL_PERIOD_US: i64 = 1_000_000;
+
+impl GroupBudget {
+    /// What is missing for threads that need a share of a processor: with less the kernel holds them at the end of every period.
+    pub fn shortfall(&self, needed: f64) -> Option<Shortfall> {
+        let Self::Limited { file, budget_us, period_us } = self else { return None };
+        let needed_us = (needed * *period_us as f64).floor();
+        // Without any, FIFO priority is refused, which is said there.
+        let is_too_small = *budget_us > 0 && (*budget_us as f64) < needed_us;
+        is_too_small.then(|| Shortfall {
+            what: "sufficient real-time budget of its cgroup".into(),
+            reason: format!(
+                "{budget_us} us of {period_us} us, and about {needed_us} us are needed ({})",
+                file.display()
+            ),
+            remedy: format!("write more, in the groups above it first (echo 950000 > {})", file.display()),
+        })
     }
 }
 

@@ -71,7 +71,7 @@ impl Permissions {
             return Some((reason, remedy));
         }
         match &self.group_budget {
-            GroupBudget::Limited { file, budget_us: 0 } => Some((
+            GroupBudget::Limited { file, budget_us: 0, .. } => Some((
                 format!("its cgroup has no real-time budget ({} is 0)", file.display()),
                 "write one there, in the groups above it first (echo 950000), or start it in another cgroup"
                     .into(),

@@ -86,7 +86,7 @@ pub fn all(
     facts.extend(scheduling.into_iter().map(|fact| ("scheduling", Ok(fact))));
     facts.extend([
         ("locked memory", Ok(permissions::locked_memory(permissions, realtime, refused))),
-        ("cgroup", Ok(permissions::cgroup(permissions, refused))),
+        ("cgroup", Ok(permissions::cgroup(permissions, realtime, refused))),
         ("container", Ok(permissions::container(permissions))),
         ("throttling", kernel::throttling(host)),
         ("processors", Ok(processors::count(chosen))),

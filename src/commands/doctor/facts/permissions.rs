@@ -60,14 +60,17 @@ pub fn locked_memory(permissions: &Permissions, realtime: &Realtime, refused: &R
 }
 
 /// Budget of the process's cgroup for real-time scheduling.
-pub fn cgroup(permissions: &Permissions, refused: &RefusedRights) -> Fact {
+pub fn cgroup(permissions: &Permissions, realtime: &Realtime, refused: &RefusedRights) -> Fact {
+    if let Some(shortfall) = permissions.group_budget.shortfall(realtime.needed_share()) {
+        return refused_fact(&shortfall);
+    }
     match &permissions.group_budget {
         GroupBudget::Unlimited => Fact::good("does not limit real-time threads"),
-        GroupBudget::Limited { file, budget_us: 0 } => Fact::bad(
+        GroupBudget::Limited { file, budget_us: 0, .. } => Fact::bad(
             format!("has no budget for real-time threads ({})", file.display()),
             format!("write one there, in the groups above it first: echo 950000 > {}", file.display()),
         ),
-        GroupBudget::Limited { file, budget_us } => {
+        GroupBudget::Limited { file, budget_us, .. } => {
             Fact::good(format!("{budget_us} us a period for real-time threads ({})", file.display()))
         }
         GroupBudget::Unknown { group } if refused.thread.is_empty() => {
@@ -148,7 +151,10 @@ mod tests {
 
     #[test]
     fn budgets_of_a_group_are_distinguished() {
-        let of = |budget_us| GroupBudget::Limited { file: "/c/cpu.rt_runtime_us".into(), budget_us };
+        let of = |budget_us| {
+            let file = "/c/cpu.rt_runtime_us".into();
+            GroupBudget::Limited { file, budget_us, period_us: 1_000_000 }
+        };
         let unseen = GroupBudget::Unknown { group: "/c/g".into() };
         let refused =
             RefusedRights { thread: vec![shortfall("FIFO priority 80")], ..RefusedRights::default() };
@@ -156,12 +162,13 @@ mod tests {
             (GroupBudget::Unlimited, &refused, Good),
             (of(0), &refused, Bad),
             (of(-1), &refused, Good),
+            (of(4000), &refused, Bad),
             (of(950_000), &refused, Good),
             (unseen.clone(), &refused, Unknown),
             (unseen, &RefusedRights::default(), Good),
         ] {
             let permissions = Permissions { group_budget, ..Permissions::of_this_process() };
-            let fact = cgroup(&permissions, refused);
+            let fact = cgroup(&permissions, &realtime(), refused);
             assert_eq!(fact.assessment, assessment, "{fact:?}");
         }
     }

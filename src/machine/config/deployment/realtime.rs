@@ -73,6 +73,11 @@ pub enum Scheduler {
     Deadline,
 }
 
+/// Time of loop and I/O in a cycle \[s\]: twice what a slow processor takes for the longest cycle that is known (2026-11-29).
+const CYCLE_S: f64 = 80e-6;
+/// Share that a loop gets at most: the kernel leaves 5 % to others.
+const LARGEST_SHARE: f64 = 0.95;
+
 impl Realtime {
     /// Time from one release to the next.
     pub fn period_s(&self) -> f64 {
@@ -91,6 +96,12 @@ impl Realtime {
         if let Err(shortfall) = scheduling::fifo_priority((self.io_priority - 1).max(1)) {
             debug!("{shortfall}");
         }
+    }
+
+    /// Share of a processor that loop and I/O need, with the spin before a release.
+    pub fn needed_share(&self) -> f64 {
+        let spin_s = if self.release == ReleaseMode::Hybrid { self.max_lead_s } else { 0.0 };
+        (self.rate_hz * (CYCLE_S + spin_s)).min(LARGEST_SHARE)
     }
 
     /// Processors to which threads are bound; none in simulated time.
