@@ -215,4 +215,9 @@ fn that_could_not_be_seen_are_refused_with_the_reason() {
     for word in ["0.100 %", "t = 0.", ": velocity: ", " times the limit in [limits]"] {
         assert!(error.contains(word), "{word:?} must be in {error}");
     }
+    // Within the tolerance of every setpoint, and at rest.
+    let mut config = deployed("motion_base");
+    config.machine.actuator.min_length = 1e-6;
+    let refused = Trajectory::built_in(&config, BuiltInMotion::Sines, 8.0);
+    assert!(refused.as_ref().is_err_and(|error| error.to_string().contains("limits")), "{refused:?}");
 }

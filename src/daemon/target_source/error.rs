@@ -98,7 +98,7 @@ impl From<&str> for Reason {
     fn from(text: &str) -> Self {
         let without_fault =
             "the daemon reports no fault: is the driver, or in simulated time a source, started?";
-        Self(if text.is_empty() { without_fault } else { text }.into())
+        Self(if matches!(text, "" | "none") { without_fault } else { text }.into())
     }
 }
 
@@ -126,5 +126,18 @@ impl fmt::Display for Deviation {
         let [mm, mrad] =
             [self.0.linear, self.0.angular].map(|error| significant(1e-6 * (1e9 * error.norm()).round()));
         write!(f, "{mm} mm and {mrad} mrad")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_always_has_a_reason() {
+        for text in ["", "none", "no measurement"] {
+            let refusal = TargetError::UnknownPose(text.into()).to_string();
+            assert!(refusal.ends_with("started?") || refusal.ends_with(": no measurement"), "{refusal}");
+        }
     }
 }
