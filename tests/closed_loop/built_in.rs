@@ -8,6 +8,7 @@ use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::{Request, State};
+use hexad::daemon::precheck::Precheck;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
@@ -54,7 +55,7 @@ fn engage(rig: &mut Rig, task: &TaskState) {
 
 /// Plays a scene, its first instant this part of a cycle after a setpoint.
 fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
-    first_refusal(config, |t| scene.at(t), scene.duration, phase).is_none()
+    first_refusal(config, |t| scene.at(t), scene.duration, phase, 0).is_none()
 }
 
 /// The time \[s\] at which a motion is no longer followed, and why.
@@ -63,6 +64,7 @@ fn first_refusal(
     at: impl Fn(f64) -> TaskState,
     duration_s: f64,
     phase: f64,
+    may_miss: u64,
 ) -> Option<(f64, DiagnosticCode)> {
     let mut rig = Rig::new(config, &config.machine);
     engage(&mut rig, &at(0.0));
@@ -71,7 +73,7 @@ fn first_refusal(
     (0..cycles).map(|k| (f64::from(k) - phase) * period_s).find_map(|t| {
         let output = rig.cycle(&rig.input(&at(t)));
         let followed = (output.state, output.diagnostic.code) == (State::Active, DiagnosticCode::None);
-        let is_followed = followed && output.missed_setpoints == 0;
+        let is_followed = followed && output.missed_setpoints <= may_miss;
         (!is_followed).then_some((t, output.diagnostic.code))
     })
 }
@@ -99,8 +101,38 @@ fn certificate_an_excitation_of_weak_drives_is_followed() {
             }
         };
         for phase in [0.0, 0.37, 0.5] {
-            let refusal = first_refusal(&config, |t| excitation.at(t), excitation.duration(), phase);
+            let refusal = first_refusal(&config, |t| excitation.at(t), excitation.duration(), phase, 0);
             assert_eq!(refusal, None, "{} {}", config.name, config.machine.actuator.max_force);
+        }
+    });
+}
+
+/// A table at the edge of what the pre-check accepts is followed, wherever in a cycle its rows fall.
+#[test]
+fn certificate_what_the_precheck_accepts_is_followed() {
+    let weak = |name: &str, share: f64| {
+        let machine = with_force(name, 1e6).machine;
+        let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().hardest_held();
+        with_force(name, share * held)
+    };
+    let all = MACHINES.into_iter().flat_map(|name| [1.5, 2.0, 3.0, 100.0].map(|share| weak(name, share)));
+    let all = all.flat_map(|config| MOTIONS.map(|motion| (config.clone(), motion)));
+    cases(all, 7).into_par_iter().for_each(|(config, motion)| {
+        let scene = fit(&config.machine, motion, 2.0);
+        let precheck = Precheck::new(&config);
+        let is_taken = |share: f64| {
+            let scene = scene.smaller(share);
+            precheck.refusal(|t| scene.at(t), [0.0, scene.duration]).is_none()
+        };
+        let (mut low, mut high) = (0.0, 2.0);
+        for _ in 0..10 {
+            let middle = 0.5 * (low + high);
+            if is_taken(middle) { low = middle } else { high = middle }
+        }
+        let scene = scene.smaller(low);
+        for phase in [0.0, 0.37, 0.5, 0.9] {
+            let refusal = first_refusal(&config, |t| scene.at(t), scene.duration, phase, u64::MAX);
+            println!("{} {} {motion:?} {low}: {refusal:?}", config.name, config.machine.actuator.max_force);
         }
     });
 }
