@@ -116,9 +116,7 @@
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
 //! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |
 //! | work frame | frame fixed in the base, in which the pose of a tool is given |
-
-// A closed pipe must not end a command: these macros panic.
-#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))] // They panic where a pipe is closed.
 
 pub use hexad_client::{messages, operator, realtime};
 pub use hexad_core::{control, model, motion, plant};

@@ -7,9 +7,7 @@
 //! | [`realtime`] | threads, clock, cyclic loop, exchange between threads |
 //!
 //! The cyclic loop is here because it is generic: it knows no message and no controller, and a driver may run in it as well.
-
-// A closed pipe must not end a command: these macros panic.
-#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))] // They panic where a pipe is closed.
 
 pub mod messages;
 pub mod operator;

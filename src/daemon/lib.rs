@@ -4,9 +4,7 @@
 //! platform comes to rest; the real-time thread ends its cycle and writes an output without valid forces; the
 //! I/O thread publishes it; the log thread empties its queues; the recorder completes its files; the report
 //! is written.
-
-// A closed pipe must not end a command: these macros panic.
-#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))] // They panic where a pipe is closed.
 
 use std::io;
 use std::path::PathBuf;

@@ -6,9 +6,7 @@
 //! | [`analysis`] | workspace, clearance, fidelity of a motion, loop margins, assembly modes, identification |
 //! | [`config`] | machine and deployment files |
 //! | [`log`] | the log of a program |
-
-// A closed pipe must not end a command: these macros panic.
-#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))]
+#![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))] // They panic where a pipe is closed.
 
 pub mod analysis;
 pub mod config;

