@@ -131,9 +131,12 @@ mod tests {
             for (kind, scale) in [(SetpointKind::Target, 0.5 * share), (SetpointKind::Motion, 1.0)] {
                 let setpoint = Setpoint { kind, target_speed, ..Setpoint::default() };
                 let (setpoint, samples) = (SetpointMotion::new(setpoint), PoseSamples::default());
-                let found =
-                    Target::of_setpoint(&setpoint, &samples).limits(&limits, &Acceleration::default());
+                let target = Target::of_setpoint(&setpoint, &samples);
+                let found = target.limits(&limits, 1.0, &Acceleration::default());
                 assert_eq!([found.position.jerk, found.orientation.velocity], [scale; 2], "{target_speed}");
+                // With a hundredth of the strength a motion of its own has the lesser acceleration of both.
+                let weak = target.limits(&limits, 0.01, &Acceleration::default());
+                assert_eq!(weak.position.acceleration, scale.min(0.01), "{target_speed}");
             }
         }
     }
