@@ -43,7 +43,7 @@ pub fn hold(input: &[u8]) -> bool {
     };
     let motions = read(&trajectory_columns(), &[]);
     if let Some(table) = &motions {
-        for (is_joint_space, stems) in [(false, 4), (true, 4 + 11)] {
+        for (is_joint_space, stems) in [(false, 5), (true, 5 + 11)] {
             let mut written = inverse_dynamics(&MACHINE, Fidelity::Exact, is_joint_space, table).0;
             check_output(table, &mut written, 1 + stems * 6);
         }
