@@ -91,7 +91,7 @@ fn certificate_an_excitation_of_weak_drives_is_followed() {
         with_force(name, held * (1.2 + 0.03 * f64::from(run)))
     });
     let all: Vec<_> = seen.into_iter().chain([tilted]).chain(random).collect();
-    let count = if Certificate::is_long() { all.len() } else { 3 };
+    let count = if Certificate::is_long() { all.len() } else { 1 };
     all.into_par_iter().take(count).for_each(|config| {
         let excitation = match Trajectory::excitation(&config, 1, 0.7, 0) {
             Ok(excitation) => excitation,
