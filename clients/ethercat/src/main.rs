@@ -1,4 +1,5 @@
 //! The command `hexad-ethercat`; see `hexad-ethercat --help`.
+#![deny(clippy::print_stdout, clippy::print_stderr)] // They panic where a pipe is closed.
 
 mod commands;
 

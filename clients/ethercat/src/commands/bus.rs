@@ -14,10 +14,16 @@ use hexad_ethercat::{
     brake_test, file_edit, inventory, jog as jogging, machine_check, objects, scan as scanning,
 };
 use hexad_machine::config::Config;
+use hexad_machine::text::files::print;
 
 use tracing::warn;
 
 use super::{Failure, after_start, before_start, load_drives, load_machine, load_text, none_of, open};
+
+/// Prints a line. A pipe that is closed must end no command while drives are enabled.
+macro_rules! say {
+    ($($text:tt)*) => { drop(print(format_args!("{}\n", format_args!($($text)*)))) };
+}
 
 /// Cycles for which faults are acknowledged, after as many without.
 const RESET_CYCLES: u32 = 100;
@@ -29,7 +35,7 @@ pub fn scan(interface: &str, name: &str) -> Result<(), Failure> {
     let frames = Frames::new();
     let mut bus = open(&frames, interface)?;
     let devices = startup::find(&mut bus).map_err(before_start)?;
-    print!("{}", scanning::drives_file(&mut bus, &devices, name, interface));
+    drop(print(scanning::drives_file(&mut bus, &devices, name, interface)));
     Ok(())
 }
 
@@ -44,8 +50,8 @@ pub fn check(drives: &Path, machine: Option<&Path>, is_offline: bool) -> Result<
         errors.extend(inventory::contradictions(&mut bus, &devices, &file));
     }
     none_of(errors)?;
-    println!("{}: no error", drives.display());
-    file.untested_brakes().into_iter().for_each(|text| println!("{text}"));
+    say!("{}: no error", drives.display());
+    file.untested_brakes().into_iter().for_each(|text| say!("{text}"));
     Ok(())
 }
 
@@ -96,7 +102,7 @@ pub fn brakes(drives: &Path, machine: &Path) -> Result<(), Failure> {
     none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
     let stop = Stop::on_signals().map_err(before_start)?;
     test_brakes(&file, &machine, &stop)?.map_err(after_start)?;
-    println!("{}", if stop.is_requested() { "the test was stopped" } else { "the tested brakes hold" });
+    say!("{}", if stop.is_requested() { "the test was stopped" } else { "the tested brakes hold" });
     Ok(())
 }
 
@@ -119,7 +125,7 @@ pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: 
     let (mut bus, devices, mut data) = operational(&frames, &file, section.units().length_m(0))?;
     let force_n = f64::from(permille) * section.units().newtons_per_permille().abs();
     let cycles = (seconds * 1e6 / f64::from(file.bus.period_us)) as u64;
-    println!("leg {leg}: pushing with {force_n:.0} N; Ctrl-C ends it");
+    say!("leg {leg}: pushing with {force_n:.0} N; Ctrl-C ends it");
     let found = jogging::jog(&mut bus, &devices, &mut data, leg - 1, force_n, cycles, || stop.is_requested());
     leave(bus, devices);
     let jogging::Jog { way_m, is_direction_right } = found.map_err(after_start)?;
@@ -129,10 +135,10 @@ pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: 
         )));
     }
     let (way_mm, word) = (way_m * 1e3, if way_m > 0.0 { "longer" } else { "shorter" });
-    println!("leg {leg}: by its encoder it is {:.3} mm {word}; look whether it is", way_mm.abs());
+    say!("leg {leg}: by its encoder it is {:.3} mm {word}; look whether it is", way_mm.abs());
     edit(drives, leg, &[("jogged_serial", is_direction_right.then(|| section.serial.to_string()))])?;
     if is_direction_right {
-        println!("leg {leg}: if it is not, `sign` is wrong");
+        say!("leg {leg}: if it is not, `sign` is wrong");
         return Ok(());
     }
     Err(after_start(format!(
@@ -166,7 +172,7 @@ pub fn zero(drives: &Path, leg: usize, length_m: f64) -> Result<(), Failure> {
     let offset_m = length_m - counts as f64 * section.units().metres_per_count();
     let values = [("serial", Some(identity.serial.to_string())), ("offset_m", Some(format!("{offset_m:?}")))];
     edit(drives, leg, &values)?;
-    println!("leg {leg}: offset_m = {offset_m:?} with the drive of serial number {}", identity.serial);
+    say!("leg {leg}: offset_m = {offset_m:?} with the drive of serial number {}", identity.serial);
     Ok(())
 }
 
@@ -212,7 +218,7 @@ pub fn read(drives: &Path, leg: usize, text: &str) -> Result<(), Failure> {
     let frames = Frames::new();
     let (mut bus, devices) = pre_op(&frames, &file)?;
     let value = bus.objects(&devices, position).value(index, sub).map_err(after_start)?;
-    println!("{index:#06x}:{sub} = {value} ({value:#x})");
+    say!("{index:#06x}:{sub} = {value} ({value:#x})");
     Ok(())
 }
 
