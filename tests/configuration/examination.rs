@@ -166,8 +166,8 @@ fn exchanged(file: &str, legs: [usize; 2]) -> String {
     rows[legs[1]]["platform_m"] = first;
     // The stroke must not refuse them.
     let actuator = table["actuator"].as_table_mut().unwrap();
-    actuator.insert("min_length_m".into(), 0.01.into());
-    actuator.insert("max_length_m".into(), 10.0.into());
+    actuator.insert("min_length_m".into(), 0.05.into());
+    actuator.insert("max_length_m".into(), 5.0.into());
     table.to_string()
 }
 
