@@ -21,7 +21,7 @@ HALF_WIDTH_S, SAMPLES_PER_HALF_WIDTH = 0.02, 4
 GROUP = 16
 STANDING_M_S, STANDING_RATIO = 0.03, 0.2
 POSE = [f"estimated_{name}" for name in ("alpha", "beta", "gamma", "x", "y", "z")]
-FORCES = [f"force_{i}" for i in range(1, 7)]
+FORCES = [f"drive_command_{i}" for i in range(1, 7)]
 COLUMNS = ["cycle", "missed_measurements", "t", "estimated_t", *POSE, *FORCES]
 
 
