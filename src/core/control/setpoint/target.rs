@@ -1,5 +1,8 @@
 //! Target of the reference in one cycle: a motion or a pose, and the share of the limits for the way to it.
 
+#[cfg(not(feature = "std"))]
+use nalgebra::ComplexField as _;
+
 use crate::control::parameters::Parameters;
 use crate::control::setpoint::motion::{RelativeMotion, SetpointMotion};
 use crate::control::setpoint::pose_samples::PoseSamples;
