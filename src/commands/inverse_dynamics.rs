@@ -68,8 +68,8 @@ fn fidelity_by_name() -> impl TypedValueParser<Value = Fidelity> {
     })
 }
 
-/// Forces of the legs, lengths and their derivatives, and commands of the drives for a table with the columns of a trajectory, and whether all rows are solved. At a singular
-/// pose the forces are NaN. `is_joint_space`: the columns of `JOINT_SPACE` follow, NaN for a leg along its universal axis.
+/// Forces of the legs, lengths and their derivatives, and commands of the drives for a table with the columns of a trajectory, and
+/// whether all rows are solved. At a singular pose the forces are NaN. `is_joint_space`: the columns of `JOINT_SPACE` follow, NaN for a leg along its universal axis.
 pub fn inverse_dynamics(
     machine: &Machine,
     fidelity: Fidelity,

@@ -125,7 +125,12 @@ impl Precheck {
             if let Err(diagnostic) = result {
                 let active_limits = active_limits.union(reference.active_limits());
                 let policy = self.parameters.on_violation;
-                let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits, policy };
+                let refusal = SetpointRefusal {
+                    t: self.time(from, k),
+                    diagnostic: Some(diagnostic),
+                    active_limits,
+                    policy,
+                };
                 if refused(refusal).is_break() {
                     return;
                 }
@@ -139,10 +144,9 @@ impl Precheck {
         }
         // Within the tolerance a reference that never moves would count as one that follows.
         if moved < LEAST_MOVED_SHARE * wanted {
-            let diagnostic = Diagnostic::new(DiagnosticCode::SetpointBeyondLimits, wanted, 1.0);
-            let active_limits = reference.active_limits();
             let policy = self.parameters.on_violation;
-            let _ = refused(SetpointRefusal { t: to, diagnostic, active_limits, policy });
+            let active_limits = reference.active_limits();
+            let _ = refused(SetpointRefusal { t: to, diagnostic: None, active_limits, policy });
         }
     }
 
@@ -157,7 +161,8 @@ impl Precheck {
 pub struct SetpointRefusal {
     /// Time since the start of the trajectory \[s\].
     pub t: f64,
-    diagnostic: Diagnostic,
+    /// `None`: the reference did not follow at all.
+    diagnostic: Option<Diagnostic>,
     active_limits: LimitSet,
     policy: ViolationPolicy,
 }
@@ -169,6 +174,12 @@ impl fmt::Display for SetpointRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { t, diagnostic, active_limits, policy } = self;
         write!(f, "t = {t:.4}: ")?;
+        let Some(diagnostic) = diagnostic else {
+            return write!(
+                f,
+                "the platform would not move: no stop within [limits] is proved from where it stands"
+            );
+        };
         // In reverse order of the checks, which end at the first exceeded limit.
         let limits = [Limit::Jerk, Limit::LegRate, Limit::Acceleration, Limit::Velocity];
         let beyond = limits.into_iter().find(|limit| active_limits.contains(*limit));

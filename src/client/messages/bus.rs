@@ -76,13 +76,16 @@ const UNSETTLED: [&str; 4] = ["HangsInCreation", "SystemInFlux", "IsBeingCreated
 /// Longest time that a participant takes to create or remove what it shares: it reads its program from a slow disk, or has no processor.
 const SETTLING_LIMIT: Duration = Duration::from_secs(2);
 
-/// The result of an attempt after others have created or removed what it needs. Only while ports are opened: it waits.
-fn when_settled<T, E: core::fmt::Debug>(mut attempt: impl FnMut() -> Result<T, E>) -> Result<T, E> {
+/// The result of an attempt after others have created or removed what it needs, or after a time.
+fn when_settled<T, E: core::fmt::Debug>(
+    longest: Duration,
+    mut attempt: impl FnMut() -> Result<T, E>,
+) -> Result<T, E> {
     let begun = Instant::now();
     loop {
         let result = attempt();
         let is_unsettled = |error: &E| UNSETTLED.iter().any(|name| format!("{error:?}").contains(name));
-        if !result.as_ref().is_err_and(is_unsettled) || begun.elapsed() >= SETTLING_LIMIT {
+        if !result.as_ref().is_err_and(is_unsettled) || begun.elapsed() >= longest {
             return result;
         }
         sleep(Duration::from_millis(5));
@@ -95,22 +98,29 @@ pub struct Bus {
     machine: String,
     is_simulated: bool,
     epoch: u64,
+    /// Longest wait for what others are creating.
+    patience: Duration,
 }
 
 impl Bus {
     /// Joins the topics `hexad/<machine>/...`, whose times are CLOCK_MONOTONIC. `machine` is the configured
     /// name. The epoch of all publishers is now.
     pub fn join(machine: &str) -> Result<Self, PortError> {
-        Self::join_topics(machine, false)
+        Self::join_topics(machine, false, SETTLING_LIMIT)
     }
 
     /// Joins the topics `hexad-simulated/<machine>/...` of a daemon with `release = "lockstep"`, whose times are those
     /// of the measured messages. No hardware subscribes to them.
     pub fn join_simulated(machine: &str) -> Result<Self, PortError> {
-        Self::join_topics(machine, true)
+        Self::join_topics(machine, true, SETTLING_LIMIT)
     }
 
-    fn join_topics(machine: &str, is_simulated: bool) -> Result<Self, PortError> {
+    /// The same without any wait: for who has a stop to send or to receive.
+    pub fn join_at_once(machine: &str, is_simulated: bool) -> Result<Self, PortError> {
+        Self::join_topics(machine, is_simulated, Duration::ZERO)
+    }
+
+    fn join_topics(machine: &str, is_simulated: bool, patience: Duration) -> Result<Self, PortError> {
         // Its warnings (cleaned-up dead nodes) are routine here.
         set_log_level(LogLevel::Error);
         let location = Location::open()?;
@@ -119,12 +129,12 @@ impl Bus {
             let builder = NodeBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled);
             builder.config(&location.config).create::<ipc::Service>()
         };
-        let node = when_settled(create).map_err(|cause| {
+        let node = when_settled(patience, create).map_err(|cause| {
             let known = refusal().or_else(|| location.obstacle());
             let cause = known.unwrap_or_else(|| format!("{cause:?}"));
             PortError::new("cannot create a node".into(), cause)
         })?;
-        Ok(Self { node, machine: machine.into(), is_simulated, epoch: monotonic_ns() })
+        Ok(Self { node, machine: machine.into(), is_simulated, epoch: monotonic_ns(), patience })
     }
 
     /// Whether the times of the messages are simulated.
@@ -174,7 +184,7 @@ impl Bus {
             let builder = builder.max_nodes(MAX_NODES).subscriber_max_buffer_size(BUFFER);
             builder.enable_safe_overflow(true).history_size(0).open_or_create()
         };
-        when_settled(open).map_err(port_error(format!("cannot open topic {name}")))
+        when_settled(self.patience, open).map_err(port_error(format!("cannot open topic {name}")))
     }
 }
 
@@ -221,6 +231,7 @@ mod tests {
                 thread::sleep(Duration::from_millis(100));
                 permit(0o400);
             });
+            assert!(Bus::join_at_once(&name, false).unwrap().subscriber::<ForceMessage>(1).is_err());
             assert!(Bus::join(&name).unwrap().subscriber::<ForceMessage>(1).is_ok());
         });
     }

@@ -130,7 +130,9 @@ pub(super) fn send(request: Request, endpoint: &Endpoint, process: &Process, tim
     let carried_out = signal.request();
     // Joined before the signal is sent. Another user's messages are not visible, but the socket may still
     // answer.
-    let join = || Bus::join(&endpoint.machine).and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok();
+    let join = || {
+        Bus::join_at_once(&endpoint.machine, false).and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok()
+    };
     let mut statuses = endpoint.is_own().then(join).flatten();
     let sent_ns = monotonic_ns();
     if let Err(error) = process.send(signal) {

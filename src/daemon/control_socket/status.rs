@@ -43,9 +43,8 @@ struct Topics {
 
 impl Topics {
     fn open(config: &Config) -> Option<Self> {
-        let is_simulated = config.deployment.realtime.is_simulated();
-        let join = if is_simulated { Bus::join_simulated } else { Bus::join };
-        let bus = join(&config.name).ok()?;
+        // This thread serves stops.
+        let bus = Bus::join_at_once(&config.name, config.deployment.realtime.is_simulated()).ok()?;
         Some(Self { setpoint: bus.topic().ok()?, measured: bus.topic().ok()?, _bus: bus })
     }
 }

@@ -18,7 +18,7 @@
 //! **If the stop is proved**, the reference takes the proposed motion and holds the stop ready (`stop`).
 //!
 //! **The drives must be able to make it.** Near a weak pose, or with weak drives, they cannot give the
-//! accelerations of `[limits]`. Proposal and stop then use a share of them, the strength. A motion of its own is made with
+//! accelerations of `[limits]`. Proposal and stop then use a share of them, the strength. An autonomous motion is made with
 //! the lesser of its accelerations and that share, and with less velocity: it brakes for a target among weak poses in
 //! time, where the strength falls on the way.
 //!

@@ -137,7 +137,7 @@ mod tests {
                 let target = Target::of_setpoint(&setpoint, &samples);
                 let found = target.limits(&limits, 1.0, &Acceleration::default());
                 assert_eq!([found.position.jerk, found.orientation.velocity], [scale; 2], "{target_speed}");
-                // With a hundredth of the strength a motion of its own has the lesser acceleration of both.
+                // With a hundredth of the strength an autonomous motion has the lesser acceleration of both.
                 let weak = target.limits(&limits, 0.01, &Acceleration::default());
                 assert_eq!(weak.position.acceleration, scale.min(0.01), "{target_speed}");
             }
