@@ -2,6 +2,7 @@
 //!
 //! A number without unit is refused, because it has two likely readings. Zero needs no unit.
 
+use hexad_machine::text::excerpt::stranger;
 use hexad_machine::text::units::{ANGLES, LENGTHS, Units, in_letters};
 
 /// Bounds of a length and of an angle, larger than any machine.
@@ -67,7 +68,8 @@ impl Quantity {
             }
             None => {
                 let units: Vec<_> = self.units.iter().map(|(unit, _)| *unit).collect();
-                Err(format!("must be {} in {}, for example 5{likely}", self.noun, units.join(", ")))
+                let (units, stranger) = (units.join(", "), stranger(text));
+                Err(format!("must be {} in {units}, for example 5{likely}{stranger}", self.noun))
             }
         }
     }

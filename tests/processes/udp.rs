@@ -102,12 +102,17 @@ fn ride() -> Ride {
     let stood = pose("in a pause");
     let_pass(Duration::from_millis(300));
     assert!((pose("in a pause")[4] - stood[4]).abs() < 1e-4, "must stand in a pause");
+    let report = &status(&machine)["status"]["sources"][0]["processes"][0]["input"];
+    assert!(
+        report.as_str().is_some_and(|it| it.contains("; 1 rejected: it has 2 fields, must have 7")),
+        "{report}"
+    );
     let second = send(&socket, &to, began, 5.5, false);
     send(&socket, &to, began, 2.0, true);
     player.signal("INT");
     let ended = player.ends();
     assert!(
-        ended.status.success() && ended.stderr.contains("it has not the numbers of --format"),
+        ended.status.success() && ended.stderr.contains("it has 2 fields, must have 7"),
         "{}",
         ended.stderr
     );

@@ -4,6 +4,7 @@ use std::net::IpAddr;
 
 use hexad_bridge::requests::{STOPS, requests_of_names};
 use hexad_core::control::signals::state::Request;
+use hexad_machine::text::excerpt::toml_error;
 use nix::ifaddrs::getifaddrs;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -82,7 +83,8 @@ const MAX_RATE_HZ: f64 = 1000.0;
 impl NetworkFile {
     /// Reads and checks a text; error texts name it `place`.
     pub fn parse(text: &str, place: &str) -> Result<Self, String> {
-        let file: Self = toml::from_str(text).map_err(|error| format!("{place}: {error}"))?;
+        let file: Self =
+            toml::from_str(text).map_err(|error| format!("{place}: {}", toml_error(text, &error)))?;
         file.ros2.check().map_err(|error| format!("{place}: ros2.{error}"))?;
         Ok(file)
     }

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use hexad_client::operator::protocol::{AnswerLine, RequestResult};
 use hexad_core::control::signals::state::Request;
+use hexad_machine::text::excerpt::toml_error;
 use hexad_machine::text::files::{print, remark};
 use hexad_machine::text::numbers::significant;
 use hexad_machine::text::text_table::{Left, Right, text_table};
@@ -48,7 +49,8 @@ impl FleetFile {
     pub fn load(place: &Path) -> Result<Self, String> {
         let text = fs::read_to_string(place).map_err(|error| format!("{}: {error}", place.display()))?;
         let name = place.display();
-        let mut file: Self = toml::from_str(&text).map_err(|error| format!("{name}: {error}"))?;
+        let mut file: Self =
+            toml::from_str(&text).map_err(|error| format!("{name}: {}", toml_error(&text, &error)))?;
         file.identity.resolve(place).map_err(|error| format!("{name}: {error}"))?;
         check_name(&file.name).map_err(|error| format!("{name}: name = {error}"))?;
         for (machine, endpoint) in &file.machine {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hexad_bridge::requests::{STOPS, requests_of_names};
 use hexad_core::control::signals::state::Request;
+use hexad_machine::text::excerpt::toml_error;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
@@ -94,7 +95,8 @@ impl NetworkFile {
     /// Reads and checks a text; error texts name it `place`.
     pub fn parse(text: &str, place: &Path) -> Result<Self, String> {
         let name = place.display();
-        let mut file: Self = toml::from_str(text).map_err(|error| format!("{name}: {error}"))?;
+        let mut file: Self =
+            toml::from_str(text).map_err(|error| format!("{name}: {}", toml_error(text, &error)))?;
         let section = &mut file.zenoh;
         let checked = section.check().and_then(|()| section.identity.resolve(place));
         checked.map_err(|error| format!("{name}: zenoh.{error}"))?;

@@ -53,6 +53,9 @@ pub struct RequestLine {
     /// Remote side for which a bridge sends the request: its own words, which nobody has verified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remote: Option<String>,
+    /// With `status`: what the client, if it publishes setpoints, says of its own input. Reports repeat it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input: Option<String>,
     /// Whether a motion takes control, if the platform is not under control. `within_s` bounds the wait for it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub engage: bool,

@@ -72,11 +72,21 @@ pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
     first_answer(machine, status_of)
 }
 
+/// The same, for a source of setpoints that says something of its own input.
+pub fn status_for_source(machine: &str, input: Option<String>) -> Result<AnswerLine, OperatorError> {
+    let line = RequestLine { input, ..RequestLine::new("status") };
+    first_answer(machine, |endpoint| status_at(endpoint, &line))
+}
+
 /// The status of the daemon that listens at an endpoint.
 pub fn status_of(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+    status_at(endpoint, &RequestLine::new("status"))
+}
+
+fn status_at(endpoint: &Endpoint, line: &RequestLine) -> Result<AnswerLine, OperatorError> {
     ask_at(endpoint, Endpoint::connect_to_read, |mut connection| {
         let until = Instant::now() + FIRST_LINE_LIMIT;
-        converse(&mut connection, &RequestLine::new("status"), until, FIRST_LINE_LIMIT, || false, |_| ())
+        converse(&mut connection, line, until, FIRST_LINE_LIMIT, || false, |_| ())
     })
 }
 

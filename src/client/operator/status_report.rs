@@ -149,4 +149,7 @@ pub struct ProcessReport {
     /// Whether its messages are ignored, because another process is used.
     #[serde(default)]
     pub is_ignored: bool,
+    /// What it says of its own input, as of datagrams that it did not follow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input: Option<String>,
 }

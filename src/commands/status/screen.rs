@@ -48,6 +48,9 @@ impl fmt::Display for Screen<'_> {
         legs(f, report)?;
         singularity(f, report)?;
         report.sources.iter().try_for_each(|source| writeln!(f, "{}", source_line(source)))?;
+        let inputs =
+            report.sources.iter().flat_map(|source| &source.processes).filter_map(|it| it.input.as_ref());
+        inputs.map(|input| paragraph("input     ", input, WIDTH)).try_for_each(|text| write!(f, "{text}"))?;
         writeln!(f, "{}", file_line(&report.configuration))
     }
 }
@@ -216,6 +219,7 @@ pub(in crate::commands) mod tests {
             command: "a".repeat(15),
             user: "operator".into(),
             is_ignored: false,
+            input: None,
         };
         let source = |topic: &str| SourceReport {
             topic: topic.into(),

@@ -33,6 +33,9 @@ impl Server<'_> {
         if line.request == "status" {
             self.status.mover = self.motions.client(&self.connection_ids);
             self.status.stops = Some(self.stops());
+            if let Some(input) = &line.input {
+                self.status.set_input(connection.peer.process_id.cast_unsigned(), input);
+            }
             let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
             return connection.answer(request, answer.clone());

@@ -1,5 +1,6 @@
 //! Answer to `status`: the newest cycle, in the units of the messages, for panels and `hexad status`.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::process;
@@ -22,6 +23,13 @@ use hexad_core::control::signals::limits::{Limit, LimitSet};
 use hexad_core::control::signals::state::State;
 use hexad_core::model::LEGS;
 use hexad_machine::config::Config;
+use hexad_machine::text::excerpt::excerpt_of_length;
+
+/// Longest description of the input of a source, in characters.
+const MAX_INPUT: usize = 600;
+
+/// Sources whose descriptions are kept.
+const MAX_INPUTS: usize = 16;
 
 /// Source of status reports.
 pub struct StatusSource {
@@ -33,6 +41,8 @@ pub struct StatusSource {
     pub stops: Option<StopNumber>,
     /// Topics, opened at the first report; `None` if they cannot be opened: then the processes are unknown.
     topics: Option<Option<Topics>>,
+    /// What processes say of their input.
+    inputs: BTreeMap<u32, String>,
 }
 
 struct Topics {
@@ -52,7 +62,14 @@ impl Topics {
 impl StatusSource {
     /// Source for a machine.
     pub fn new(loaded: Arc<Loaded>) -> Self {
-        Self { loaded, reloads: 0, mover: None, stops: None, topics: None }
+        Self { loaded, reloads: 0, mover: None, stops: None, topics: None, inputs: BTreeMap::new() }
+    }
+
+    /// Keeps what a process says of its input, for as long as it publishes setpoints.
+    pub fn set_input(&mut self, process_id: u32, input: &str) {
+        if self.inputs.len() < MAX_INPUTS || self.inputs.contains_key(&process_id) {
+            self.inputs.insert(process_id, excerpt_of_length(input, MAX_INPUT));
+        }
     }
 
     /// The configuration in force.
@@ -137,7 +154,10 @@ impl StatusSource {
         let is_simulated = config.deployment.realtime.is_simulated();
         let now_ns = measured_ns.filter(|_| is_simulated).unwrap_or(now_ns);
         let topics = self.topics.get_or_insert_with(|| Topics::open(config)).as_ref();
-        let mover = self.mover;
+        let setpoint_processes = topics.map(|topics| topics.setpoint.publisher_process_ids());
+        self.inputs
+            .retain(|id, _| setpoint_processes.as_ref().is_none_or(|processes| processes.contains(id)));
+        let (mover, inputs) = (self.mover, &self.inputs);
         let source = |topic: &str,
                       time_ns: Option<u64>,
                       of: Publishers,
@@ -145,7 +165,11 @@ impl StatusSource {
                       rejection: Option<Rejection>| SourceReport {
             topic: topic.into(),
             age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
-            processes: processes.into_iter().flatten().map(|id| process_report(id, of, mover)).collect(),
+            processes: processes
+                .into_iter()
+                .flatten()
+                .map(|id| process_report(id, of, mover, inputs))
+                .collect(),
             rejected: rejection.map(|rejection| rejection.to_string()),
         };
         vec![
@@ -153,7 +177,7 @@ impl StatusSource {
                 "setpoint",
                 snapshot.setpoint.map(|setpoint| setpoint.time_ns),
                 snapshot.setpoint_publishers,
-                topics.map(|topics| topics.setpoint.publisher_process_ids()),
+                setpoint_processes,
                 snapshot.setpoint_rejection,
             ),
             source(
@@ -194,7 +218,12 @@ fn legs(snapshot: &Snapshot) -> Vec<LegReport> {
 }
 
 /// A publisher. For a motion that the daemon publishes itself it is the client that has requested it.
-fn process_report(publisher: u32, publishers: Publishers, mover: Option<u32>) -> ProcessReport {
+fn process_report(
+    publisher: u32,
+    publishers: Publishers,
+    mover: Option<u32>,
+    inputs: &BTreeMap<u32, String>,
+) -> ProcessReport {
     let process_id = mover.filter(|_| publisher == process::id()).unwrap_or(publisher);
     let user = fs::metadata(format!("/proc/{process_id}")).map(|found| user_name(found.uid()));
     ProcessReport {
@@ -202,6 +231,7 @@ fn process_report(publisher: u32, publishers: Publishers, mover: Option<u32>) ->
         command: command(process_id),
         user: user.unwrap_or_default(),
         is_ignored: publisher == publishers.ignored_pid,
+        input: inputs.get(&publisher).cloned(),
     }
 }
 

@@ -1,13 +1,16 @@
-//! Format of datagrams with poses: which number is at which place, with its unit.
+//! Format of datagrams with poses: which number is at which place, with its unit and range, and by what a datagram is known to be one of them.
 
+use std::f64::consts::PI;
 use std::fs;
 
 use serde::Deserialize;
 
+use super::rejection::Rejection;
 use crate::commands::quantity::{angle, length};
 use hexad_core::model::rigid::Pose;
 use hexad_core::model::task::{TaskState, task_coordinates};
 use hexad_core::motion::rotation_order::RotationOrder;
+use hexad_machine::text::excerpt::{excerpt, toml_error};
 
 /// Formats by name.
 const KNOWN: [(&str, &str); 3] = [
@@ -21,6 +24,12 @@ const XPLANE_HEADER: usize = 5;
 
 /// Record of X-Plane: its number and eight values.
 const XPLANE_RECORD: usize = 36;
+
+/// Longest datagram that is read.
+pub const MAX_BYTES: usize = 8192;
+
+/// Names of the numbers.
+const NAMES: [&str; 7] = ["stamp", "alpha", "beta", "gamma", "x", "y", "z"];
 
 /// Reasons of a format that is not usable.
 #[derive(Debug, thiserror::Error)]
@@ -45,15 +54,20 @@ pub struct Datagram {
 pub struct DatagramFormat {
     encoding: Encoding,
     byte_order: ByteOrder,
+    separator: char,
+    /// Number of fields, or of bytes.
+    size: usize,
+    end: String,
+    mark: Vec<Mark>,
     order: RotationOrder,
     /// The stamp, then the coordinates of X.
     fields: [Option<Field>; 7],
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Encoding {
-    /// Numbers with commas, semicolons, bars or white space between them; `at` counts them from 0.
+    /// Numbers with `separator` between them; `at` counts them from 0.
     Text,
     /// Numbers in memory format; `at` is the number's first byte.
     Binary,
@@ -75,10 +89,47 @@ enum NumberType {
     #[default]
     F32,
     F64,
+    I8,
+    U8,
     I16,
     U16,
+    I24,
+    U24,
     I32,
     U32,
+}
+
+impl NumberType {
+    fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I24 | Self::U24 => 3,
+            Self::F32 | Self::I32 | Self::U32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    fn number(self, little: [u8; 8]) -> f64 {
+        let word = u64::from_le_bytes(little);
+        match self {
+            Self::F32 => f64::from(f32::from_bits(word as u32)),
+            Self::F64 => f64::from_bits(word),
+            Self::I8 => f64::from(word as i8),
+            Self::I16 => f64::from(word as i16),
+            Self::I24 => f64::from(((word as i32) << 8) >> 8),
+            Self::I32 => f64::from(word as i32),
+            Self::U8 | Self::U16 | Self::U24 | Self::U32 => word as f64,
+        }
+    }
+}
+
+/// Bytes by which one kind of datagram is known among others.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Mark {
+    at: usize,
+    bytes: Vec<u8>,
 }
 
 /// One number: `(number - zero) * scale` in its unit.
@@ -95,6 +146,8 @@ struct Field {
     #[serde(default = "one")]
     scale: f64,
     unit: String,
+    /// In the unit; an angle is otherwise within half a turn.
+    range: Option<[f64; 2]>,
     /// The unit in SI.
     #[serde(skip)]
     factor: f64,
@@ -106,6 +159,13 @@ struct FormatFile {
     encoding: Encoding,
     #[serde(default)]
     byte_order: ByteOrder,
+    separator: Option<String>,
+    fields: Option<usize>,
+    length_bytes: Option<usize>,
+    #[serde(default)]
+    end: String,
+    #[serde(default)]
+    mark: Vec<Mark>,
     #[serde(default = "xyz")]
     rotation: String,
     stamp: Option<Field>,
@@ -137,9 +197,21 @@ impl DatagramFormat {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let file: FormatFile = toml::from_str(text).map_err(|error| error.to_string())?;
+        let file: FormatFile = toml::from_str(text).map_err(|error| toml_error(text, &error))?;
         let order = RotationOrder::ALL.into_iter().find(|order| order.name() == file.rotation);
         let order = order.ok_or("rotation must be xyz, xzy, yxz, yzx, zxy or zyx")?;
+        let separator = match (file.encoding, file.separator.as_deref()) {
+            (Encoding::Text, Some("space")) => ' ',
+            (Encoding::Text, Some("tab")) => '\t',
+            (Encoding::Text, Some(one)) if [",", ";", "|"].contains(&one) => {
+                one.chars().next().unwrap_or(',')
+            }
+            (Encoding::Text, _) => {
+                return Err("separator must be \",\", \";\", \"|\", \"space\" or \"tab\": what is between two numbers".into());
+            }
+            (_, None) => ' ',
+            (_, Some(_)) => return Err("separator is of encoding = \"text\" alone".into()),
+        };
         let mut fields = [file.stamp, file.alpha, file.beta, file.gamma, file.x, file.y, file.z];
         for (index, field) in fields.iter_mut().enumerate() {
             let Some(field) = field else { continue };
@@ -150,60 +222,131 @@ impl DatagramFormat {
                 _ => length(&one),
             }
             .map_err(|reason| format!("unit = \"{}\": {reason}", field.unit))?;
+            if (1..=3).contains(&index) {
+                let half_turn = PI / field.factor;
+                field.range.get_or_insert([-half_turn, half_turn]);
+            }
+            if let Some([low, high]) = field.range.filter(|[low, high]| !(low < high)) {
+                return Err(format!("range = [{low}, {high}]: the first must be less than the second"));
+            }
         }
         if fields.iter().skip(1).all(Option::is_none) {
             return Err("has none of alpha, beta, gamma, x, y, z".into());
         }
-        Ok(Self { encoding: file.encoding, byte_order: file.byte_order, order, fields })
+        let mut places: Vec<_> = fields.iter().flatten().map(|field| field.place(file.encoding)).collect();
+        places.sort_unstable();
+        if let Some([_, (_, [at, _])]) =
+            places.array_windows().find(|[(a, [_, end]), (b, [at, _])]| a == b && at < end)
+        {
+            return Err(format!("at = {at} is part of two numbers"));
+        }
+        let needed = places.iter().map(|(_, [_, end])| *end).max().unwrap_or(0);
+        let (key, stated, other) = match file.encoding {
+            Encoding::Text => ("fields", file.fields, file.length_bytes),
+            _ => ("length_bytes", file.length_bytes, file.fields),
+        };
+        if other.is_some() || (file.encoding == Encoding::XPlane && stated.is_some()) {
+            return Err("fields is of encoding = \"text\" alone, length_bytes of \"binary\"".into());
+        }
+        let size = stated.unwrap_or(needed);
+        if size < needed || size > MAX_BYTES {
+            return Err(format!("{key} = {size}: must be in [{needed}, {MAX_BYTES}]"));
+        }
+        let FormatFile { encoding, byte_order, end, mark, .. } = file;
+        Ok(Self { encoding, byte_order, separator, size, end, mark, order, fields })
     }
 
-    /// Pose of a datagram: its coordinates are about the pose `home`, its rotation is about the axes of the base. `None` if a number is
-    /// missing or not finite.
-    pub fn read(&self, bytes: &[u8], home: &Pose, near: &[f64; 6]) -> Option<Datagram> {
-        let text = std::str::from_utf8(bytes).unwrap_or_default();
-        let is_between = |c: char| c.is_whitespace() || [',', ';', '|'].contains(&c);
-        let words: Vec<_> = text.split(is_between).filter(|word| !word.is_empty()).collect();
-        let number = |field: &Field| match self.encoding {
-            Encoding::Text => words.get(field.at)?.parse().ok(),
-            Encoding::Binary => self.number(bytes.get(field.at..)?, field.number_type),
-            Encoding::XPlane => f32_of(xplane_record(bytes, field.record)?.get(4 + 4 * field.at..)?),
+    /// Pose of a datagram: its coordinates are about the pose `home`, its rotation is about the axes of the base.
+    pub fn read(&self, bytes: &[u8], home: &Pose, near: &[f64; 6]) -> Result<Datagram, Rejection> {
+        let is_marked = |mark: &Mark| bytes.get(mark.at..).is_some_and(|rest| rest.starts_with(&mark.bytes));
+        if !self.mark.iter().all(is_marked) {
+            return Err(Rejection::Mark);
+        }
+        let words = match self.encoding {
+            Encoding::Text => self.words(bytes)?,
+            Encoding::Binary if bytes.len() != self.size => {
+                return Err(Rejection::Length { found: bytes.len(), expected: self.size });
+            }
+            Encoding::XPlane
+                if !bytes.starts_with(b"DATA") || bytes.len() % XPLANE_RECORD != XPLANE_HEADER =>
+            {
+                return Err(Rejection::NoXPlane);
+            }
+            _ => vec![],
         };
         let mut values = [0.0; 7];
-        for (value, field) in values.iter_mut().zip(&self.fields) {
+        for ((value, field), name) in values.iter_mut().zip(&self.fields).zip(NAMES) {
             let Some(field) = field else { continue };
-            *value = (number(field)? - field.zero) * field.scale * field.factor;
-            if !value.is_finite() {
-                return None;
+            let number = match self.encoding {
+                Encoding::Text => self.number_of(words.get(field.at).copied().unwrap_or_default())?,
+                Encoding::Binary => self.number_at(bytes, field.at, field.number_type),
+                Encoding::XPlane => {
+                    let record =
+                        xplane_record(bytes, field.record).ok_or(Rejection::NoRecord(field.record))?;
+                    self.number_at(record, 4 + 4 * field.at, NumberType::F32)
+                }
+            };
+            let in_unit = (number - field.zero) * field.scale;
+            let [low, high] = field.range.unwrap_or([f64::MIN, f64::MAX]);
+            if !(low..=high).contains(&in_unit) {
+                return Err(Rejection::Range { name, value: in_unit, low, high, unit: field.unit.clone() });
             }
+            *value = in_unit * field.factor;
         }
         let [stamp_s, ref coordinates @ ..] = values;
         let moved = self.order.motion(&TaskState::at_rest(*coordinates)).pose;
         let pose =
             Pose { rotation: moved.rotation * home.rotation, position: home.position + moved.position };
         let stamp_s = self.fields[0].as_ref().map(|_| stamp_s);
-        Some(Datagram { stamp_s, x: task_coordinates(&pose, near) })
+        Ok(Datagram { stamp_s, x: task_coordinates(&pose, near) })
     }
 
-    fn number(&self, bytes: &[u8], number_type: NumberType) -> Option<f64> {
-        let size = match number_type {
-            NumberType::I16 | NumberType::U16 => 2,
-            NumberType::F32 | NumberType::I32 | NumberType::U32 => 4,
-            NumberType::F64 => 8,
+    /// The fields of a text.
+    fn words<'a>(&self, bytes: &'a [u8]) -> Result<Vec<&'a str>, Rejection> {
+        let text = std::str::from_utf8(bytes).map_err(|_| Rejection::NoText)?;
+        // Programs in C send the end of their strings.
+        let text = text.trim_end_matches('\0');
+        let text =
+            text.strip_suffix(self.end.as_str()).ok_or(Rejection::End)?.trim_matches(['\r', '\n', ' ']);
+        let words: Vec<_> = match self.separator {
+            ' ' => text.split_ascii_whitespace().collect(),
+            separator => text.split(separator).map(str::trim_ascii).collect(),
         };
-        let mut little = [0; 8];
-        little.get_mut(..size)?.copy_from_slice(bytes.get(..size)?);
-        if let ByteOrder::Big = self.byte_order {
-            little.get_mut(..size)?.reverse();
+        match words.len() == self.size {
+            true => Ok(words),
+            false => Err(Rejection::Fields { found: words.len(), expected: self.size, text: excerpt(text) }),
         }
-        let word = u64::from_le_bytes(little);
-        Some(match number_type {
-            NumberType::F32 => f64::from(f32::from_bits(word as u32)),
-            NumberType::F64 => f64::from_bits(word),
-            NumberType::I16 => f64::from(word as i16),
-            NumberType::U16 => f64::from(word as u16),
-            NumberType::I32 => f64::from(word as i32),
-            NumberType::U32 => f64::from(word as u32),
-        })
+    }
+
+    /// The number of a field. A comma is its decimal point where semicolons separate.
+    fn number_of(&self, word: &str) -> Result<f64, Rejection> {
+        let parsed = match self.separator {
+            ';' if !word.contains('.') => word.replacen(',', ".", 1).parse(),
+            _ => word.parse(),
+        };
+        parsed.map_err(|_| Rejection::no_number(word))
+    }
+
+    /// The number in memory format; NaN if the bytes end before it.
+    fn number_at(&self, bytes: &[u8], at: usize, number_type: NumberType) -> f64 {
+        let mut little = [0; 8];
+        let size = number_type.bytes();
+        let (Some(place), Some(found)) = (little.get_mut(..size), bytes.get(at..at + size)) else {
+            return f64::NAN;
+        };
+        place.copy_from_slice(found);
+        if let ByteOrder::Big = self.byte_order {
+            place.reverse();
+        }
+        number_type.number(little)
+    }
+}
+
+impl Field {
+    /// Its record, and its first place and the one after it.
+    fn place(&self, encoding: Encoding) -> (u32, [usize; 2]) {
+        let size = if let Encoding::Binary = encoding { self.number_type.bytes() } else { 1 };
+        (self.record, [self.at, self.at.saturating_add(size)])
     }
 }
 
@@ -216,78 +359,11 @@ fn seconds(unit: &str) -> Result<f64, String> {
     }
 }
 
-fn f32_of(bytes: &[u8]) -> Option<f64> {
-    Some(f64::from(f32::from_le_bytes(*bytes.first_chunk()?)))
-}
-
 /// Record of X-Plane with this number.
 fn xplane_record(bytes: &[u8], number: u32) -> Option<&[u8]> {
-    let records = bytes.strip_prefix(b"DATA").and(bytes.get(XPLANE_HEADER..))?;
+    let records = bytes.get(XPLANE_HEADER..)?;
     records.chunks_exact(XPLANE_RECORD).find(|record| record.first_chunk() == Some(&number.to_le_bytes()))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::commands::arguments::DEFAULT_CONFIG;
-    use hexad_machine::config::Config;
-
-    fn read(name: &str, bytes: &[u8]) -> Option<[f64; 6]> {
-        let machine = Config::parse(DEFAULT_CONFIG, "a test").unwrap().machine;
-        let format = DatagramFormat::load(name).unwrap();
-        let datagram = format.read(bytes, &machine.home_pose(), &machine.home)?;
-        Some(core::array::from_fn(|k| datagram.x[k] - machine.home[k]))
-    }
-
-    fn assert_near(found: Option<[f64; 6]>, degrees: [f64; 3], millimetres: [f64; 3]) {
-        let found = found.unwrap();
-        let order = RotationOrder::Zyx;
-        let angles = degrees.map(f64::to_radians);
-        let pose = order.motion(&TaskState::at_rest([angles[0], angles[1], angles[2], 0.0, 0.0, 0.0])).pose;
-        let expected = task_coordinates(&pose, &[0.0; 6]);
-        for k in 0..3 {
-            assert!((found[k] - expected[k]).abs() < 1e-6, "{found:?} {expected:?}");
-            assert!((found[3 + k] - 1e-3 * millimetres[k]).abs() < 1e-6, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn the_formats_with_a_name_read_what_their_first_lines_say() {
-        let text = b"12.5, -3;4 | 1.0 -2.0\t30\r\n";
-        assert_near(read("flypt-mover", text), [1.0, -2.0, 30.0], [12.5, -3.0, 4.0]);
-        assert_eq!(read("flypt-mover", b"1,2,3,4,5"), None, "a number is missing");
-        assert_eq!(read("flypt-mover", b"1,2,3,4,5,nan"), None);
-
-        let mut xplane = b"DATA*".to_vec();
-        for (number, values) in [(3_u32, [9.0_f32; 8]), (17, [5.0, -10.0, 90.0, 0.0, 0.0, 0.0, 0.0, 0.0])] {
-            xplane.extend(number.to_le_bytes());
-            xplane.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-        }
-        assert_near(read("x-plane", &xplane), [-10.0, -5.0, 0.0], [0.0; 3]);
-        assert_eq!(read("x-plane", &xplane[..41]), None, "without record 17");
-        assert_eq!(read("x-plane", b"DATA"), None);
-
-        let simtools: Vec<_> =
-            [65535_u16, 0, 32768, 65535, 32767, 0].iter().flat_map(|v| v.to_be_bytes()).collect();
-        let found = read("simtools", &simtools).unwrap();
-        assert!([found[3] - 0.1, found[4] + 0.1, found[5]].iter().all(|x| x.abs() < 2e-6), "{found:?}");
-    }
-
-    #[test]
-    fn a_wrong_format_is_refused_by_name() {
-        for (text, word) in [
-            ("encoding = \"text\"", "none of alpha"),
-            ("encoding = \"text\"\nx = { at = 0, unit = \"deg\" }", "unit = \"deg\""),
-            ("encoding = \"text\"\nx = { at = 0 }", "unit"),
-            ("encoding = \"text\"\nx = { at = 0, unit = \"mm\", offset = 1 }", "offset"),
-            ("encoding = \"text\"\nrotation = \"zyz\"\nx = { at = 0, unit = \"mm\" }", "rotation must be"),
-            (
-                "encoding = \"text\"\nstamp = { at = 1, unit = \"h\" }\nx = { at = 0, unit = \"mm\" }",
-                "in s, ms or us",
-            ),
-        ] {
-            let reason = DatagramFormat::parse(text).unwrap_err();
-            assert!(reason.contains(word), "{text}: {reason}");
-        }
-    }
-}
+mod tests;

@@ -14,7 +14,8 @@ use std::time::Duration;
 use clap::Args;
 use tracing::{info, warn};
 
-use self::datagram_format::{Datagram, DatagramFormat, FormatError};
+use self::datagram_format::{Datagram, DatagramFormat, FormatError, MAX_BYTES};
+use self::rejection::{Rejection, RejectionCounts};
 use self::restarting_clock::RestartingClock;
 use self::status_feed::StatusFeed;
 use super::PlaybackOptions;
@@ -33,6 +34,7 @@ use hexad_machine::analysis::target_motion::{TargetRefusal, check_target};
 use hexad_machine::config::Config;
 
 mod datagram_format;
+mod rejection;
 mod restarting_clock;
 mod status_feed;
 
@@ -50,6 +52,9 @@ const BLEND_S: f64 = 3.0;
 
 /// Pause after which the platform moves to the boarding pose \[s\].
 const LONG_PAUSE_S: f64 = 10.0;
+
+/// Time without any datagram after which the possible causes are named \[s\].
+const SILENCE_S: f64 = 10.0;
 
 /// Most datagrams that are read in one period.
 const DATAGRAMS: usize = 64;
@@ -128,6 +133,7 @@ pub fn follow(
     let mut phase = Phase::Boarding;
     while !stop.is_repeated() {
         let newest = receiver.newest();
+        source.feed.describe_input(|| receiver.description());
         if stop.is_requested() && !matches!(phase, Phase::Leaving) {
             info!("moves to the boarding pose; once more ends at once");
             phase = Phase::Leaving;
@@ -170,7 +176,7 @@ pub fn follow(
             }
         }
     }
-    receiver.log_totals();
+    info!("{}", receiver.description());
     if stop.is_repeated() { Err(StreamError::Interrupted) } else { Ok(()) }
 }
 
@@ -225,7 +231,9 @@ struct Receiver {
     /// Datagrams since the last pause.
     lively: u32,
     accepted: u64,
-    rejected: [(Rejection, u64); 3],
+    rejected: RejectionCounts,
+    /// Instant at which the causes of silence are named \[ns\], until one datagram arrived.
+    silence_ends_ns: Option<u64>,
 }
 
 impl Receiver {
@@ -253,23 +261,43 @@ impl Receiver {
             last_ns: 0,
             lively: 0,
             accepted: 0,
-            rejected: [Rejection::Sender, Rejection::Format, Rejection::Late].map(|reason| (reason, 0)),
+            rejected: RejectionCounts::default(),
+            silence_ends_ns: Some(monotonic_ns() + (SILENCE_S * 1e9) as u64),
         })
     }
 
     /// Instant and X of the newest datagram that arrived since the last call.
     fn newest(&mut self) -> Option<(u64, [f64; 6])> {
         let mut newest = None;
-        let mut bytes = [0; 2048];
+        // One more: what is longer is not cut to the longest.
+        let mut bytes = [0; MAX_BYTES + 1];
         for _ in 0..DATAGRAMS {
             let Ok((size, sender)) = self.socket.recv_from(&mut bytes) else { break };
             let arrival_ns = monotonic_ns();
+            self.silence_ends_ns = None;
             match self.sample(bytes.get(..size).unwrap_or_default(), sender.ip(), arrival_ns) {
                 Ok(sample) => newest = Some(sample),
-                Err(rejection) => self.count(rejection, sender),
+                Err(rejection) if self.rejected.add(&rejection) => {
+                    warn!(%sender, "a datagram is rejected: {rejection}");
+                }
+                Err(_) => {}
             }
         }
+        if self.silence_ends_ns.take_if(|end_ns| *end_ns < monotonic_ns()).is_some() {
+            warn!(
+                "no datagram has arrived for {SILENCE_S:.0} s: the program does not send, or to another address or port; \
+                 it sends broadcasts, which arrive only if --udp is the broadcast address; a firewall is between"
+            );
+        }
         newest
+    }
+
+    /// What arrived, for the operator.
+    fn description(&self) -> String {
+        match (self.accepted, &self.rejected) {
+            (0, none) if *none == RejectionCounts::default() => "no datagram has arrived".into(),
+            (accepted, rejected) => format!("{accepted} datagrams accepted{rejected}"),
+        }
     }
 
     fn sample(
@@ -282,7 +310,7 @@ impl Receiver {
             return Err(Rejection::Sender);
         }
         let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
-        let Datagram { stamp_s, x } = datagram.ok_or(Rejection::Format)?;
+        let Datagram { stamp_s, x } = datagram?;
         let instant =
             |stamp_s: f64| self.clock.instant_ns((stamp_s * 1e9) as i64, arrival_ns as i64, self.max_age_ns);
         let time_ns = stamp_s.map_or(Some(arrival_ns as i64), instant).ok_or(Rejection::Late)?;
@@ -292,15 +320,6 @@ impl Receiver {
         Ok((time_ns as u64, x))
     }
 
-    fn count(&mut self, rejection: Rejection, sender: SocketAddr) {
-        for (_, count) in self.rejected.iter_mut().filter(|(reason, _)| *reason == rejection) {
-            if *count == 0 {
-                warn!(%sender, "a datagram is rejected: {rejection}");
-            }
-            *count += 1;
-        }
-    }
-
     fn silence_s(&self, now_ns: u64) -> f64 {
         seconds(self.last_ns, now_ns)
     }
@@ -308,26 +327,31 @@ impl Receiver {
     fn is_alive(&self, now_ns: u64) -> bool {
         self.lively >= LIVELY && self.silence_s(now_ns) < self.pause_s
     }
-
-    fn log_totals(&self) {
-        info!("{} datagrams accepted", self.accepted);
-        for (reason, count) in self.rejected.iter().filter(|(_, count)| *count > 0) {
-            info!("{count} rejected: {reason}");
-        }
-    }
-}
-
-/// Reason why a datagram is not followed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-enum Rejection {
-    #[error("its sender is not among --from")]
-    Sender,
-    #[error("it has not the numbers of --format")]
-    Format,
-    #[error("it is late against the stream, or older than the newest")]
-    Late,
 }
 
 fn seconds(from_ns: u64, to_ns: u64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+
+    #[test]
+    fn broadcasts_arrive_at_the_broadcast_address_and_what_is_rejected_is_counted() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let options = StreamOptions { format: Some("flypt-mover".into()), from: vec![], boarding: None };
+        let mut receiver = Receiver::open(&config, "127.255.255.255:0".parse().unwrap(), &options).unwrap();
+        assert_eq!(receiver.description(), "no datagram has arrived");
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_broadcast(true).unwrap();
+        for text in ["1,2,3,0,0,0", "1,2,3"] {
+            socket.send_to(text.as_bytes(), receiver.socket.local_addr().unwrap()).unwrap();
+        }
+        let (_, x) = receiver.newest().unwrap();
+        assert!((x[3] - config.machine.home[3] - 1e-3).abs() < 1e-12);
+        let told = receiver.description();
+        assert!(told.starts_with("1 datagrams accepted; 1 rejected: it has 3 fields"), "{told}");
+    }
 }

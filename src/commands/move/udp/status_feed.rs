@@ -9,7 +9,7 @@ use std::time::Duration;
 use crate::commands::request::carry_out_in_background;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::operator::protocol::AnswerLine as Answer;
-use hexad_client::operator::requests::{StopBaseline, status};
+use hexad_client::operator::requests::{StopBaseline, status_for_source};
 use hexad_client::operator::{OperatorError, Order};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::Request;
@@ -26,6 +26,8 @@ struct Watched {
     before: Option<Observation>,
     /// Error of the last request.
     error: Option<String>,
+    /// What the next request says of the datagrams.
+    input: Option<String>,
 }
 
 /// Receiver of the daemon's status. Its thread ends after it is dropped.
@@ -52,7 +54,8 @@ impl StatusFeed {
         spawn(move || {
             while let Some(shared) = weak.upgrade() {
                 let requested_ns = monotonic_ns();
-                let answer = status(&name);
+                let input = shared.lock().unwrap_or_else(PoisonError::into_inner).input.take();
+                let answer = status_for_source(&name, input);
                 shared.lock().unwrap_or_else(PoisonError::into_inner).receive(requested_ns, answer, &home);
                 drop(shared);
                 sleep(INTERVAL);
@@ -60,6 +63,11 @@ impl StatusFeed {
         });
         let baseline = StopBaseline::before(first);
         Self { shared, watched, machine, baseline, within, engagement: None, stop: stop.clone() }
+    }
+
+    /// Describes the input of this source, if the last description was sent.
+    pub fn describe_input(&self, describe: impl FnOnce() -> String) {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner).input.get_or_insert_with(describe);
     }
 }
 

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use crate::text::csv_columns::{Column, factor, find, hint, nearest_header, unit_names};
-use crate::text::excerpt::{excerpt, excerpt_of_length};
+use crate::text::excerpt::{excerpt, excerpt_of_length, stranger};
 use crate::text::files::FileError;
 use crate::text::numbers::MAX_MAGNITUDE;
 
@@ -230,9 +230,10 @@ impl TableErrors {
                 None => Mistake::NotANumber { column },
             };
             self.add_first(Some(mistake), || {
-                let (text, place) = (excerpt(&text), format!("line {line}: {name}"));
+                let (stranger, text, place) =
+                    (stranger(&text), excerpt(&text), format!("line {line}: {name}"));
                 match mistake {
-                    Mistake::NotANumber { .. } => format!("{place} = \"{text}\": must be a number"),
+                    Mistake::NotANumber { .. } => format!("{place} = \"{text}\": must be a number{stranger}"),
                     Mistake::NotFinite { .. } => format!("{place} = {text}: must be finite"),
                     _ => format!("{place} = {text}: must be at most {MAX_MAGNITUDE:e} in magnitude"),
                 }
