@@ -10,6 +10,7 @@ mod frames;
 mod limits;
 mod plant;
 mod reference;
+mod units;
 mod values;
 
 use hexad::config::{Config, ConfigError, Violation};

@@ -12,6 +12,7 @@ use super::{Config, ConfigError, Violation};
 
 mod envelope;
 mod machine;
+mod usual;
 mod values;
 
 /// Result of an examination.
@@ -27,6 +28,7 @@ impl Config {
     /// Examines the configuration: some milliseconds, with an envelope up to some seconds.
     pub fn examine(&self) -> Examination {
         let mut examiner = Examiner { config: self, found: Examination::default() };
+        usual::examine(&mut examiner);
         values::examine(&mut examiner);
         machine::examine(&mut examiner);
         envelope::examine(&mut examiner);
@@ -60,6 +62,14 @@ impl Examiner<'_> {
     fn warn(&mut self, key: &str, value: impl Into<String>, bound: impl Into<String>) {
         let violation = self.violation(key, value.into(), bound.into());
         self.found.warnings.push(violation);
+    }
+
+    /// Whether the file has this key.
+    fn is_stated(&self, key: &str) -> bool {
+        let (table, _) = DeTable::parse_recoverable(&self.config.text);
+        let mut parts = key.split('.');
+        let first = parts.next().and_then(|name| table.get_ref().get(name));
+        parts.try_fold(first, |found, part| Some(found?.get_ref().as_table()?.get(part))).flatten().is_some()
     }
 
     fn violation(&self, key: &str, value: String, bound: String) -> Violation {

@@ -1,13 +1,9 @@
-//! Examination of single values that are probably in a wrong unit, in a wrong place, or of another host.
+//! Examination of single values that are probably in a wrong place, or of another host.
 
 use super::Examiner;
 use crate::config::geometry::exchanged_home;
 use crate::config::machine::rounded;
 use hexad_client::realtime::setup::cpus::Cpus;
-
-/// Usual radius of gyration of the platform, as a multiple of the radius of its joints. The payload may be small and between
-/// the joints, or high above them; a unit that is wrong by a thousand changes the ratio by 32.
-const USUAL_GYRATION: core::ops::RangeInclusive<f64> = 0.05..=3.0;
 
 /// Shortest plausible delay between processes and drives \[us\]: a bus alone takes longer.
 const MIN_DELAY_US: f64 = 10.0;
@@ -15,31 +11,12 @@ const MIN_DELAY_US: f64 = 10.0;
 const MIN_THREAD_TIME_US: f64 = 1.0;
 
 pub(super) fn examine(examiner: &mut Examiner) {
-    examine_gyration(examiner);
     examine_times(examiner);
     examine_processors(examiner);
     if let Some(exchanged) = exchanged_home(&examiner.config.machine) {
         let value = format!("{:?}", examiner.config.machine.home);
         examiner.warn("home.pose", value, format!("the order is {exchanged}, and further from its ends"));
     }
-}
-
-/// Warns of an inertia that does not fit mass and size: `radius of gyration^2 = trace / (2 mass)`.
-fn examine_gyration(examiner: &mut Examiner) {
-    let machine = &examiner.config.machine;
-    let (platform, radius) = (&machine.platform, machine.joints.radius);
-    let gyration = (0.5 * platform.inertia.trace() / platform.mass).sqrt();
-    if USUAL_GYRATION.contains(&(gyration / radius)) {
-        return;
-    }
-    let bound = format!(
-        "usual is {} to {} times the radius of the joints on the platform, {} m; check the units of inertia and mass",
-        USUAL_GYRATION.start(),
-        USUAL_GYRATION.end(),
-        rounded(radius)
-    );
-    let value = format!("a radius of gyration of {} m", rounded(gyration));
-    examiner.warn("platform.inertia_kg_m2", value, bound);
 }
 
 /// Warns of times that are shorter than any hardware allows. 0 means that there is none.

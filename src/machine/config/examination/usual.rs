@@ -1,0 +1,257 @@
+//! Examination of values by ratios that are alike for machines of every size: a wrong unit shows in them.
+//!
+//! The bounds are those of the machines that we know, from a piezo stage of 0.1 mm to a motion base of 20 kN, with room beyond. What
+//! they cannot know: docs/operator.md.
+
+use core::ops::RangeInclusive;
+
+use super::Examiner;
+use crate::analysis::drive_capability::DriveCapability;
+use crate::config::machine::rounded;
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::Link;
+use nalgebra::Vector3;
+
+/// A ratio of a value of the file.
+#[derive(Clone)]
+struct Ratio {
+    key: &'static str,
+    /// Number, and of what it is this multiple.
+    ratio: f64,
+    of: &'static str,
+    usual: RangeInclusive<f64>,
+}
+
+pub(super) fn examine(examiner: &mut Examiner) {
+    let gravity = examiner.config.machine.gravity.norm();
+    if gravity != 0.0 && !(9.7..=9.9).contains(&gravity) {
+        let bound = "on the Earth it is 9.76 to 9.84 m/s^2, in space 0: check its unit, or the site";
+        examiner.warn("gravity_m_s2", format!("{} long", rounded(gravity)), bound);
+    }
+    let ratios = [body_ratios(examiner), drive_ratios(examiner), deployment_ratios(examiner)].concat();
+    for Ratio { key, ratio, of, usual } in ratios {
+        // Zero: without it. Infinite: without a bound.
+        if ratio == 0.0 || !ratio.is_finite() || usual.contains(&ratio) || !examiner.is_stated(key) {
+            continue;
+        }
+        let bound = format!("usual is {} to {}: check the unit of both", usual.start(), usual.end());
+        examiner.warn(key, format!("{} times {of}", rounded(ratio)), bound);
+    }
+}
+
+/// Masses, centres of mass and radii of gyration against sizes.
+fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
+    let machine = &examiner.config.machine;
+    let (platform, cylinder, rod) = (&machine.platform, &machine.cylinder, &machine.rod);
+    let (radius, shortest) = (machine.joints.radius, machine.actuator.min_length);
+    let gyration = (0.5 * platform.inertia.trace() / platform.mass).sqrt();
+    let transverse = |link: &Link| {
+        let inertia = &link.transverse_inertia;
+        inertia.constant + inertia.quadratic * (shortest - inertia.reference_length).powi(2)
+    };
+    let of_link = |link: &Link| {
+        [
+            link.center_of_mass / shortest,
+            (link.axial_inertia / link.mass).sqrt() / shortest,
+            (transverse(link) / link.mass).sqrt() / shortest,
+        ]
+    };
+    let [cylinder_center, cylinder_axial, cylinder_transverse] = of_link(cylinder);
+    let [rod_center, rod_axial, rod_transverse] = of_link(rod);
+    let base = &machine.joints.triples.unpack_vectors(&machine.joints.base);
+    let middle = base.iter().sum::<Vector3<f64>>() / LEGS as f64;
+    let base_radius = base.iter().map(|joint| (joint - middle).norm()).sum::<f64>() / LEGS as f64;
+    const LENGTH: &str = "actuator.min_length_m";
+    const GYRATION: &str = "actuator.min_length_m as radius of gyration, from inertia and mass";
+    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
+    vec![
+        ratio(
+            "platform.mass_kg",
+            platform.mass / (cylinder.mass + rod.mass),
+            "the mass of a leg",
+            0.5..=300.0,
+        ),
+        ratio(
+            "platform.center_of_mass_m",
+            platform.center_of_mass.norm() / radius,
+            "the radius of the joints",
+            0.0..=3.0,
+        ),
+        ratio(
+            "platform.inertia_kg_m2",
+            gyration / radius,
+            "the radius of the joints as radius of gyration, from inertia and mass",
+            0.25..=2.5,
+        ),
+        ratio("leg", base_radius / radius, "platform_m (radii of the joints by base_m)", 0.3..=8.0),
+        ratio("cylinder.mass_kg", cylinder.mass / rod.mass, "rod.mass_kg", 0.2..=8.0),
+        ratio("cylinder.center_of_mass_m", cylinder_center, LENGTH, 0.1..=1.2),
+        ratio("cylinder.axial_inertia_kg_m2", cylinder_axial, GYRATION, 0.01..=0.25),
+        ratio("cylinder.transverse_inertia_kg_m2", cylinder_transverse, GYRATION, 0.05..=0.7),
+        ratio("rod.center_of_mass_m", rod_center, LENGTH, 0.1..=1.2),
+        ratio("rod.axial_inertia_kg_m2", rod_axial, GYRATION, 0.01..=0.25),
+        ratio("rod.transverse_inertia_kg_m2", rod_transverse, GYRATION, 0.025..=0.7),
+    ]
+}
+
+/// Lengths, forces and frictions of the drives.
+fn drive_ratios(examiner: &Examiner) -> Vec<Ratio> {
+    let machine = &examiner.config.machine;
+    let actuator = &machine.actuator;
+    let largest = |of_legs: &[f64; LEGS]| of_legs.iter().copied().fold(0.0, f64::max);
+    let drives = DriveCapability::new(machine, &machine.home_pose());
+    let held = drives.map_or(0.0, |drives| drives.hardest_held().1);
+    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
+    let (force, stroke) = (actuator.max_force, actuator.max_length - actuator.min_length);
+    const FORCE: &str = "actuator.max_force_n";
+    vec![
+        ratio(
+            "actuator.max_length_m",
+            actuator.max_length / actuator.min_length,
+            "actuator.min_length_m",
+            1.0..=6.0,
+        ),
+        ratio(
+            "actuator.max_rate_m_s",
+            stroke / actuator.max_rate,
+            "a second for the whole stroke",
+            0.005..=150.0,
+        ),
+        ratio(FORCE, force / held, "the largest force that holds the platform at home", 1.0..=120.0),
+        ratio(
+            "actuator.reflected_mass_kg",
+            actuator.reflected_mass * LEGS as f64 / machine.platform.mass,
+            "the platform's mass on a leg",
+            0.1..=150.0,
+        ),
+        ratio(
+            "actuator.viscous_friction_n_s_m",
+            largest(&actuator.viscous_friction) * actuator.max_rate / force,
+            "actuator.max_force_n at max_rate_m_s",
+            0.003..=0.6,
+        ),
+        ratio("actuator.coulomb_friction_n", largest(&actuator.coulomb_friction) / force, FORCE, 0.001..=0.4),
+        ratio("actuator.friction_uncertainty_n", actuator.friction_uncertainty / force, FORCE, 0.001..=0.4),
+    ]
+}
+
+/// Limits and tolerances against each other, lengths against angles at the radius of the joints.
+fn deployment_ratios(examiner: &Examiner) -> Vec<Ratio> {
+    let deployment = &examiner.config.deployment;
+    let machine = &examiner.config.machine;
+    let (control, limits, noise) = (&deployment.control, &deployment.limits, &deployment.noise);
+    let (linear, angular) = (&limits.reference.position, &limits.reference.orientation);
+    let (radius, stroke) = (machine.joints.radius, machine.actuator.max_length - machine.actuator.min_length);
+    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
+    let window = &deployment.in_position;
+    let rounding = if noise.length_step_m > 0.0 { noise.length_m / noise.length_step_m } else { 0.0 };
+    let mut ratios = vec![
+        ratio(
+            "limits.velocity_m_s",
+            stroke / linear.velocity,
+            "a second for the whole stroke",
+            0.005..=150.0,
+        ),
+        ratio(
+            "limits.payload_change_kg",
+            limits.payload_change_kg.unwrap_or_default() / machine.platform.mass,
+            "platform.mass_kg",
+            0.005..=3.0,
+        ),
+        ratio(
+            "limits.disturbance_step_m_s2",
+            limits.disturbance_step_m_s2.unwrap_or_default() / linear.acceleration,
+            "limits.acceleration_m_s2",
+            0.03..=10.0,
+        ),
+        ratio(
+            "limits.force_rate_n_s",
+            limits.force_rate_n_s / machine.actuator.max_force,
+            "actuator.max_force_n in a second",
+            3.0..=900.0,
+        ),
+        ratio("limits.stroke_margin_m", limits.stroke_margin_m / stroke, "the stroke", 3e-4..=0.2),
+        ratio(
+            "control.disturbance_m_s2_per_sqrt_s",
+            control.disturbance_m_s2_per_sqrt_s / linear.acceleration,
+            "limits.acceleration_m_s2",
+            0.03..=10.0,
+        ),
+        ratio("measured.length_noise_m", noise.length_m / stroke, "the stroke", 0.0..=1e-3),
+        ratio("measured.length_noise_m", rounding, "measured.length_step_m", 0.1..=30.0),
+        ratio(
+            "measured.pose_tolerance_m",
+            noise.pose_tolerance_m / noise.length_m,
+            "measured.length_noise_m",
+            20.0..=15000.0,
+        ),
+        ratio("measured.length_step_m", noise.length_step_m / stroke, "the stroke", 0.0..=3e-3),
+        ratio(
+            "measured.rate_noise_m_s",
+            noise.rate_m_s.unwrap_or_default() / machine.actuator.max_rate,
+            "actuator.max_rate_m_s",
+            0.0..=0.1,
+        ),
+    ];
+    // Named as the stated one of both.
+    let mut pairs = |keys: [&'static str; 2], found: f64, of: &'static str, usual: RangeInclusive<f64>| {
+        let [first, second] = keys;
+        let key = if examiner.is_stated(first) { first } else { second };
+        ratios.push(ratio(key, found, of, usual));
+    };
+    const ANGLES: &str = "that of the rotation, at the radius of the joints";
+    let at_radius = |linear: f64, angular: f64| linear / angular / radius;
+    pairs(
+        ["limits.velocity_m_s", "limits.velocity_rad_s"],
+        at_radius(linear.velocity, angular.velocity),
+        ANGLES,
+        0.08..=12.0,
+    );
+    pairs(
+        ["limits.acceleration_m_s2", "limits.acceleration_rad_s2"],
+        at_radius(linear.acceleration, angular.acceleration),
+        ANGLES,
+        0.05..=20.0,
+    );
+    for (keys, bound) in [
+        (["limits.jerk_m_s3", "limits.acceleration_m_s2"], linear),
+        (["limits.jerk_rad_s3", "limits.acceleration_rad_s2"], angular),
+    ] {
+        pairs(keys, bound.jerk / bound.acceleration, "the acceleration in a second", 3.0..=2000.0);
+    }
+    for (keys, engage, following) in [
+        (
+            ["control.engage_position_m", "control.following_position_m"],
+            control.engage_position_m,
+            control.following_position_m,
+        ),
+        (
+            ["control.engage_orientation_rad", "control.following_orientation_rad"],
+            control.engage_orientation_rad,
+            control.following_orientation_rad,
+        ),
+    ] {
+        pairs(keys, engage / following, "control.following_*", 0.005..=1.0);
+    }
+    for (keys, following, limit) in [
+        (
+            ["control.following_velocity_m_s", "limits.velocity_m_s"],
+            control.following_velocity_m_s,
+            linear.velocity,
+        ),
+        (
+            ["control.following_velocity_rad_s", "limits.velocity_rad_s"],
+            control.following_velocity_rad_s,
+            angular.velocity,
+        ),
+    ] {
+        pairs(keys, following / limit, "limits.velocity_*", 0.02..=4.0);
+    }
+    pairs(
+        ["in_position.tolerance_m", "in_position.tolerance_rad"],
+        at_radius(window.tolerance_m, window.tolerance_rad),
+        ANGLES,
+        0.03..=30.0,
+    );
+    ratios
+}
