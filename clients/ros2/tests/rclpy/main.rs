@@ -121,6 +121,18 @@ fn rclpy_reads_the_state_and_moves_the_platform_with_poses() {
 }
 
 #[test]
+fn readers_of_each_kind_take_every_message() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut cell) = Cell::open("readers", "") else { return };
+    if !cell.reaches("readers", "end of readers") {
+        return;
+    }
+    eprintln!("{}", cell.hosts.log("readers"));
+    // The library has lines of its own about each reader.
+    assert_eq!(cell.hosts.log("bridge").lines().count(), 1, "{}", cell.hosts.log("bridge"));
+}
+
+#[test]
 fn the_first_request_of_a_new_client_does_not_wait_for_a_heartbeat() {
     let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let Some(mut cell) = Cell::open("first", "") else { return };

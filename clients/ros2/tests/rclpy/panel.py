@@ -6,7 +6,7 @@ import time
 
 import rclpy
 from geometry_msgs.msg import AccelStamped, PoseStamped, Transform, Twist, TwistStamped
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
@@ -124,26 +124,31 @@ def follows(source, seconds=6.0):
     assert max(heights) < 1.2 * AMPLITUDE and min(heights) > -1.2 * AMPLITUDE, (min(heights), max(heights))
 
 
+STATE = {"/joint_states": JointState, "/pose": PoseStamped, "/twist": TwistStamped, "/acceleration": AccelStamped}
+LEGS = range(1, 7)
+JOINTS = ["prismatic_%d" % leg for leg in LEGS] + ["universal_%s_%d" % (axis, leg) for leg in LEGS for axis in ("first", "second")]
+
+
 def state():
-    # Measured lengths and the angles of universal joints are two messages.
-    node.create_subscription(JointState, "/joint_states", lambda message: newest.update({message.name[0]: message}), qos_profile_sensor_data)
-    for topic, kind in [("/pose", PoseStamped), ("/twist", TwistStamped), ("/acceleration", AccelStamped)]:
+    for topic, kind in STATE.items():
         listen(topic, kind)
-    wait("state", lambda: len(newest) == 5)
+    wait("state", lambda: len(newest) == len(STATE) and newest["/joint_states"].name == JOINTS)
 
 
 def check_state():
-    angles = newest["universal_first_1"]
-    assert len(angles.name) == 12 and max(map(abs, angles.position)) < 0.01, "at home they are 0"
-    joints = newest["prismatic_1"]
-    assert joints.name == ["prismatic_%d" % (leg + 1) for leg in range(6)], joints.name
-    assert all(1.1 < length < 2.3 for length in joints.position) and len(joints.velocity) == 6, joints
+    joints = newest["/joint_states"]
+    assert max(map(abs, joints.position[6:])) < 0.01, "at home they are 0"
+    assert all(1.1 < length < 2.3 for length in joints.position[:6]), joints
+    assert len(joints.velocity) == 18 and len(joints.effort) in (0, 18), joints
     assert newest["/pose"].header.frame_id == "base" and abs(newest["/pose"].pose.position.z - HOME_Z) < 1e-3
     age = time.time() - joints.header.stamp.sec - joints.header.stamp.nanosec * 1e-9
     assert 0.0 < age < 5.0, age
     # Nodes and topics become known one by one.
     wait("the topic /tf", lambda: ("/tf", ["tf2_msgs/msg/TFMessage"]) in node.get_topic_names_and_types())
     wait("the name of the node", lambda: "hexad_ros2" in node.get_node_names())
+    # Of ROS itself, and of the bridge: none besides.
+    topics = {"/parameter_events", "/rosout", "/tf", "/setpoint_pose", "/setpoint_trajectory", *STATE}
+    assert {name for name, _ in node.get_topic_names_and_types()} == topics, node.get_topic_names_and_types()
 
 
 def poses():
@@ -163,6 +168,34 @@ def poses():
     assert answer.success and answer.message == "standby", answer
     parks = node.create_client(Trigger, "/park")
     assert not parks.wait_for_service(timeout_sec=1.0), "not among the requests of the file"
+
+
+def readers():
+    """Readers of each kind take every message, by the numbers that the publisher gave them, and each sample of the joints is whole."""
+    state()
+    for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
+        for depth in (1, 10):
+            numbers, joints = {topic: [] for topic in STATE}, set()
+
+            def take(topic, message, info):
+                numbers[topic].append(info["publication_sequence_number"])
+                if topic == "/joint_states":
+                    joints.add(tuple(message.name))
+
+            quality = QoSProfile(depth=depth, reliability=reliability)
+            callbacks = {topic: lambda message, info, topic=topic: take(topic, message, info) for topic in STATE}
+            subscriptions = [node.create_subscription(kind, topic, callbacks[topic], quality) for topic, kind in STATE.items()]
+            wait("messages", lambda: all(numbers.values()))
+            spin(3.0)
+            for topic, taken in numbers.items():
+                sent = taken[-1] - taken[0] + 1
+                print(reliability.name, "depth", depth, topic, "sent", sent, "taken", len(taken), flush=True)
+                assert sent > 150, "3 s at 100 Hz"
+                # Beside what a pause of a process leaves in a queue of one until the next message replaces it.
+                assert sent - len(taken) <= (sent // 20 if depth == 1 else 0), (topic, sent, len(taken))
+            assert joints == {tuple(JOINTS)}, joints
+            for subscription in subscriptions:
+                node.destroy_subscription(subscription)
 
 
 def new_clients():
