@@ -32,11 +32,8 @@ const PARTICIPANT_BYTES: usize = 12;
 /// Largest number of processes whose nodes are known by name.
 const MAX_PROCESSES: usize = 256;
 
-/// Messages that are kept until they are read: as many as arrive in one pass of the loop.
+/// Messages of a topic that are kept until they are read, or until the library's thread sends them: as many as come in a pause of a busy host.
 pub const BUFFER: usize = 64;
-
-/// Messages of a topic that wait for the library's thread, as by default in ROS 2. Beyond it, only reliable readers receive the older ones.
-const UNSENT: usize = 10;
 
 /// Node of one machine. Its topics and services end with it.
 pub struct BridgeNode {
@@ -74,7 +71,7 @@ impl BridgeNode {
     pub fn publisher<M: RosMessage>(&mut self, name: &str) -> Result<Publisher<M>, String> {
         let quality = QosProfile::publisher_default()
             .reliability_reliable(WhenFull::Fail)
-            .history(History::KeepLast { depth: UNSENT });
+            .history(History::KeepLast { depth: BUFFER });
         let topic =
             self.node.create_topic(&self.absolute(name)?, type_name::<M>(), &quality).map_err(text)?;
         self.node.create_publisher(&topic, None).map_err(text)
