@@ -46,32 +46,47 @@ static FORMAT: OnceLock<LogFormat> = OnceLock::new();
 
 /// Installs the log of this process, with the filter of `HEXAD_LOG` or `RUST_LOG`, as `debug` or `info,hexad_daemon=debug`.
 pub fn install(format: LogFormat) -> Log {
-    let (filter, warning) = filter(Targets::new().with_default(LevelFilter::INFO));
+    install_without(&[], format)
+}
+
+/// The same without the events of these libraries, unless the filter names them, or is `debug`.
+pub fn install_without(libraries: &[&str], format: LogFormat) -> Log {
+    let (filter, warning) = filter(libraries);
     registry().with(filter).with(output_layer(format)).init();
     warn_of(warning);
     Log
 }
 
-/// The same beside a layer that receives the events of a library. The log leaves them out unless the filter is given.
+/// The same without those of a library, beside a layer that receives them.
 pub fn install_beside(format: LogFormat, library: &str, layer: impl Layer<Registry> + Send + Sync) -> Log {
-    let (filter, warning) =
-        filter(Targets::new().with_default(LevelFilter::INFO).with_target(library, LevelFilter::OFF));
+    let (filter, warning) = filter(&[library]);
     registry().with(layer).with(output_layer(format).with_filter(filter)).init();
     warn_of(warning);
     Log
 }
 
 /// The filter that the environment gives, else the default; and the reason why the given one is ignored.
-fn filter(default: Targets) -> (Targets, Option<String>) {
+fn filter(libraries: &[&str]) -> (Targets, Option<String>) {
+    let default = without(libraries, Targets::new().with_default(LevelFilter::INFO));
     let given = FILTER_VARIABLES.iter().find_map(|name| Some((name, env::var(name).ok()?)));
     let Some((name, text)) = given else { return (default, None) };
     let ignored = |error| {
         format!("{name} = {text:?} is ignored: {error}; must be a level, or as info,hexad_daemon=debug")
     };
     match text.parse::<Targets>() {
-        Ok(filter) => (filter, None),
+        Ok(filter) => (without(libraries, filter), None),
         Err(error) => (default, Some(ignored(error))),
     }
+}
+
+/// The filter without libraries that it does not name and of which it does not ask for `debug`.
+fn without(libraries: &[&str], filter: Targets) -> Targets {
+    let is_meant = |library: &str| {
+        filter.would_enable(library, &Level::DEBUG)
+            || filter.iter().any(|(name, _)| name.starts_with(library))
+    };
+    let left_out = libraries.iter().filter(|library| !is_meant(library));
+    filter.clone().with_targets(left_out.map(|library| (*library, LevelFilter::OFF)))
 }
 
 fn warn_of(filter: Option<String>) {
@@ -142,7 +157,26 @@ mod tests {
     use std::thread::sleep;
     use std::time::Duration;
 
-    use super::{outlet, report_failure};
+    use tracing::Level;
+
+    use super::{outlet, report_failure, without};
+
+    #[test]
+    fn a_library_is_in_the_log_only_if_it_is_named_or_debug_is_asked_for() {
+        for (filter, level) in [
+            ("info", None),
+            ("hexad_ros2=debug,warn", None),
+            ("debug", Some(Level::DEBUG)),
+            ("info,rustdds=warn", Some(Level::WARN)),
+            ("info,rustdds::discovery=info", Some(Level::INFO)),
+        ] {
+            let filter = without(&["rustdds"], filter.parse().unwrap());
+            assert!(filter.would_enable("hexad_ros2", &Level::WARN));
+            let found = [Level::DEBUG, Level::INFO, Level::WARN, Level::ERROR];
+            let found = found.into_iter().find(|level| filter.would_enable("rustdds::discovery", level));
+            assert_eq!(found, level, "{filter}");
+        }
+    }
 
     #[test]
     fn the_reason_of_the_end_is_written_before_the_process_ends() {

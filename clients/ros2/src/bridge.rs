@@ -145,13 +145,15 @@ fn drain<M: ros::RosMessage + 'static>(
 impl Output {
     fn publish(&mut self, telemetry: &Telemetry, now_ns: u64) {
         self.due_ns = (self.due_ns + self.period_ns).max(now_ns);
-        let motion = self.statuses.receive_latest().as_ref().and_then(PlatformMotion::of_status);
+        let status = self.statuses.receive_latest();
+        let motion = status.as_ref().and_then(PlatformMotion::of_status);
         if let Some(measured) = self.measured.receive_latest() {
-            let _ = self.joint_states.publish(telemetry.joint_state(&measured, motion.as_ref()));
+            // At the rate of the cycles some samples come without a status: then the motion is that of the sample before.
+            let newest = if status.is_some() { motion } else { self.before };
+            let _ = self.joint_states.publish(telemetry.joint_state(&measured, newest.as_ref()));
         }
         let before = std::mem::replace(&mut self.before, motion);
         let Some(motion) = &motion else { return };
-        let _ = self.joint_states.publish(telemetry.universal_joint_state(motion));
         let _ = self.transforms.publish(telemetry.transform(motion));
         let _ = self.poses.publish(telemetry.pose(motion));
         let _ = self.twists.publish(telemetry.twist(motion));

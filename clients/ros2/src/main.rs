@@ -52,7 +52,7 @@ impl CommandLine {
 
 fn main() -> ExitCode {
     let command = CommandLine::parse();
-    let _log = log::install(LogFormat::Text);
+    let _log = log::install_without(&["rustdds", "ros2_client"], LogFormat::Text);
     match command.execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -3,16 +3,23 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::net::IpAddr;
+use std::pin::pin;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use futures::executor::block_on;
-use ros2_client::dds::rustdds::DomainParticipantBuilder;
-use ros2_client::qos::{History, QosProfile, WhenFull};
+use futures::StreamExt;
+use futures::executor::block_on_stream;
+use futures::future::ready;
+use futures::stream::select;
+use ros2_client::dds::rustdds::{
+    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent as Event, StatusEvented,
+};
+use ros2_client::entities_info::ParticipantEntitiesInfo;
+use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{
-    Context, Gid, MessageTypeName, Name, Node, NodeEvent, NodeName, NodeOptions, Publisher, Server,
-    ServiceMapping, ServiceTypeName, Subscription,
+    Context, Gid, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, Server, ServiceMapping,
+    ServiceTypeName, Subscription,
 };
 
 use crate::first_request::repair_first_requests;
@@ -25,7 +32,7 @@ const PARTICIPANT_BYTES: usize = 12;
 /// Largest number of processes whose nodes are known by name.
 const MAX_PROCESSES: usize = 256;
 
-/// Messages that are kept until they are read: as many as arrive in one pass of the loop.
+/// Messages of a topic that are kept until they are read, or until the library's thread sends them: as many as come in a pause of a busy host.
 pub const BUFFER: usize = 64;
 
 /// Node of one machine. Its topics and services end with it.
@@ -46,20 +53,25 @@ impl BridgeNode {
             .build();
         let participant = participant.map_err(text)?;
         let first_requests = repair_first_requests(participant.clone()).map_err(text)?;
-        let context = Context::from_domain_participant(participant).map_err(text)?;
+        let context = Context::from_domain_participant(participant.clone()).map_err(text)?;
         let options = NodeOptions::new().enable_rosout(false).start_parameter_services(false);
         let name = NodeName::new(&section.namespace, "hexad_ros2").map_err(text)?;
         let mut node = context.new_node(name, options).map_err(text)?;
-        let spinner = node.spinner().map_err(text)?;
-        thread::spawn(move || block_on(spinner.spin()));
+        // Not the spinner of the library: it subscribes to /clock, which the bridge has no use for, with a wrong type and without a node.
+        let kept = QosProfile::publisher_default().durability(Durability::TransientLocal);
+        let type_name = MessageTypeName::new("rmw_dds_common", "ParticipantEntitiesInfo");
+        let topic = context.create_topic("ros_discovery_info".into(), type_name, &kept).map_err(text)?;
+        let processes = node.create_subscription(&topic, None).map_err(text)?;
         let names = NodeNames::default();
-        names.watch(&node, first_requests);
+        names.watch(participant, processes, first_requests);
         Ok(Self { node, namespace: section.namespace.clone(), names })
     }
 
-    /// Publisher of the topic `name` in the namespace, or of an absolute one.
+    /// Publisher of the topic `name` in the namespace, or of an absolute one. It waits for no reader: setpoints would wait, too.
     pub fn publisher<M: RosMessage>(&mut self, name: &str) -> Result<Publisher<M>, String> {
-        let quality = QosProfile::publisher_default().history(History::KeepLast { depth: 1 });
+        let quality = QosProfile::publisher_default()
+            .reliability_reliable(WhenFull::Fail)
+            .history(History::KeepLast { depth: BUFFER });
         let topic =
             self.node.create_topic(&self.absolute(name)?, type_name::<M>(), &quality).map_err(text)?;
         self.node.create_publisher(&topic, None).map_err(text)
@@ -104,13 +116,25 @@ fn type_name<M: RosMessage>() -> MessageTypeName {
 pub struct NodeNames(Arc<Mutex<BTreeMap<[u8; PARTICIPANT_BYTES], String>>>);
 
 impl NodeNames {
-    /// Receives the statements of all processes, in a thread of its own. It also signals each event of discovery.
-    fn watch(&self, node: &Node, first_requests: Sender<()>) {
-        let (Some(events), names) = (node.status_receiver(), self.clone()) else { return };
+    /// Receives the statements of all processes, in a thread of its own. It also signals each of them, and each match.
+    fn watch(
+        &self,
+        domain: DomainParticipant,
+        processes: Subscription<ParticipantEntitiesInfo>,
+        first_requests: Sender<()>,
+    ) {
+        let names = self.clone();
         thread::spawn(move || {
-            while let Ok(event) = events.recv_blocking() {
+            let statuses = domain.status_listener();
+            let matches = statuses.as_async_status_stream().filter_map(|event| {
+                let is_match =
+                    matches!(event, Event::RemoteWriterMatched { .. } | Event::RemoteReaderMatched { .. });
+                ready(is_match.then_some(None))
+            });
+            let statements = processes.async_stream().map(Result::ok);
+            for process in block_on_stream(pin!(select(matches, statements))) {
                 let _ = first_requests.send(());
-                let NodeEvent::ParticipantEntities(process) = event else { continue };
+                let Some((process, _)) = process else { continue };
                 let nodes: Vec<_> = process.nodes().iter().map(|node| node.fully_qualified_name()).collect();
                 let mut names = names.0.lock().unwrap_or_else(PoisonError::into_inner);
                 if names.len() >= MAX_PROCESSES {

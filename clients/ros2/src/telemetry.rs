@@ -11,6 +11,9 @@ use nalgebra::Vector6;
 use crate::conversion::{accel_message, pose_message, transform_message, twist_message};
 use crate::ros_messages as ros;
 
+/// Time before and after an instant from which the rates of angles follow \[s\].
+const DIFFERENCE_S: f64 = 1e-4;
+
 /// Motion of the platform at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct PlatformMotion {
@@ -55,7 +58,8 @@ impl Telemetry<'_> {
         ros::Header { stamp, frame_id: self.base.clone() }
     }
 
-    /// Lengths of the legs; rates and forces if they are known. Joints have their names of `hexad export --format urdf`.
+    /// One sample of all joints, with their names of `hexad export --format urdf`, as readers may keep one message alone: lengths of the
+    /// legs, rates and forces if they are known; then the universal joints, on which nothing acts, if the motion is known.
     pub fn joint_state(
         &self,
         measured: &MeasuredMessage,
@@ -64,27 +68,29 @@ impl Telemetry<'_> {
         let measurement = Measurement::from(measured);
         let machine = &self.config.machine;
         let estimated = motion.map(|motion| leg_lengths_and_rates(machine, &motion.pose, &motion.twist).1);
-        ros::JointState {
+        let mut joints = ros::JointState {
             header: self.header(measurement.time_ns),
             name: (1..).zip(measurement.length).map(|(leg, _)| format!("prismatic_{leg}")).collect(),
             position: measurement.length.into(),
             velocity: measurement.rate.or(estimated).map(Into::into).unwrap_or_default(),
             effort: measurement.drives.force.map(Into::into).unwrap_or_default(),
+        };
+        let Some(motion) = motion else { return joints };
+        let seconds = (measurement.time_ns as i64 - motion.time_ns as i64) as f64 * 1e-9;
+        let [before, now, after] = [-DIFFERENCE_S, 0.0, DIFFERENCE_S].map(|difference| {
+            let displacement = Twist::from_vector(&(motion.twist.vector() * (seconds + difference)));
+            universal_joint_angles(machine, &motion.pose.extrapolated(&displacement))
+        });
+        let names =
+            (1..=now.len()).flat_map(|leg| ["first", "second"].map(|axis| format!("universal_{axis}_{leg}")));
+        joints.name.extend(names);
+        joints.position.extend(now.as_flattened());
+        let changes = after.as_flattened().iter().zip(before.as_flattened());
+        joints.velocity.extend(changes.map(|(after, before)| (after - before) / (2.0 * DIFFERENCE_S)));
+        if !joints.effort.is_empty() {
+            joints.effort.resize(joints.name.len(), 0.0);
         }
-    }
-
-    /// Angles of the universal joints, which follow from the pose. With them a viewer of the URDF shows the legs.
-    pub fn universal_joint_state(&self, motion: &PlatformMotion) -> ros::JointState {
-        let angles = universal_joint_angles(&self.config.machine, &motion.pose);
-        let names = (1..=angles.len())
-            .flat_map(|leg| ["first", "second"].map(|axis| format!("universal_{axis}_{leg}")));
-        ros::JointState {
-            header: self.header(motion.time_ns),
-            name: names.collect(),
-            position: angles.into_iter().flatten().collect(),
-            velocity: Vec::new(),
-            effort: Vec::new(),
-        }
+        joints
     }
 
     pub fn pose(&self, motion: &PlatformMotion) -> ros::PoseStamped {
@@ -141,9 +147,17 @@ mod tests {
             ("prismatic_6", 1.5, 0)
         );
         // All legs lengthen when the platform rises.
-        assert!(joints.velocity.len() == 6 && joints.velocity.iter().all(|rate| (0.05..0.3).contains(rate)));
+        assert!(joints.velocity[..6].iter().all(|rate| (0.05..0.3).contains(rate)));
+        // The universal joints are at 0 at home, and move on from there with their rates until the measurement.
+        assert_eq!((joints.name.len(), joints.name[17].as_str()), (18, "universal_second_6"));
+        measured.header.time_ns = 12_000_000;
+        let later = telemetry.joint_state(&measured, Some(&now));
+        for (angle, rate) in later.position[6..].iter().zip(&later.velocity[6..]) {
+            assert!((angle - 1e-3 * rate).abs() < 1e-6 && rate.abs() < 0.3, "{angle} rad at {rate} rad/s");
+        }
+        assert!(later.velocity[6..].iter().any(|rate| rate.abs() > 0.01));
         measured.rates_valid = 1;
-        assert_eq!(telemetry.joint_state(&measured, Some(&now)).velocity, [0.0; 6]);
+        assert_eq!(telemetry.joint_state(&measured, Some(&now)).velocity[..6], [0.0; 6]);
         assert!(telemetry.joint_state(&MeasuredMessage::default(), None).velocity.is_empty());
     }
 }

@@ -44,6 +44,11 @@ struct Cell {
 impl Cell {
     /// A cell, unless the test cannot run here. `sections` are of the machine file.
     fn open(test: &str, sections: &str) -> Option<Self> {
+        Self::open_at(100, test, sections)
+    }
+
+    /// The same with another rate of the messages to ROS 2.
+    fn open_at(rate_hz: u32, test: &str, sections: &str) -> Option<Self> {
         let parts = Hosts::new(&format!("ros2-{test}"))
             .map_err(|why| format!("network namespaces (root, ip): {why}"));
         let parts = parts.and_then(|hosts| Ok(Self { hosts, python: rclpy()? }));
@@ -64,7 +69,7 @@ impl Cell {
         fs::write(hosts.path("m.toml"), machine + timeouts + sections).unwrap();
         let network = format!(
             "name = \"{}\"\n[ros2]\ntrusted_network = true\ninterface = \"net0\"\nsetpoints = [\"pose\", \"trajectory\"]\n\
-             requests = [\"engage\", \"clear\", \"stop\", \"estop\"]\n",
+             rate_hz = {rate_hz}\nrequests = [\"engage\", \"clear\", \"stop\", \"estop\"]\n",
             hosts.machine()
         );
         fs::write(hosts.path("m-network.toml"), network).unwrap();
@@ -118,6 +123,27 @@ fn rclpy_reads_the_state_and_moves_the_platform_with_poses() {
     let log = cell.hosts.log("daemon");
     let request = log.lines().find(|line| line.contains("request: stop")).unwrap();
     assert!(request.contains("remote=\"/panel ("), "{request}");
+}
+
+#[test]
+fn readers_of_each_kind_take_every_message() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut cell) = Cell::open_at(50, "readers", "") else { return };
+    if !cell.reaches("readers", "end of readers") {
+        return;
+    }
+    eprintln!("{}", cell.hosts.log("readers"));
+    // The library has lines of its own about each reader.
+    assert_eq!(cell.hosts.log("bridge").lines().count(), 1, "{}", cell.hosts.log("bridge"));
+}
+
+#[test]
+fn the_bridge_does_not_wait_for_a_stopped_reader() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut cell) = Cell::open_at(1000, "stopped", "") else { return };
+    if cell.reaches("stops_itself", "reads") {
+        cell.reaches("others_read", "end of others_read");
+    }
 }
 
 #[test]

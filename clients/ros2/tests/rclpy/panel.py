@@ -1,12 +1,14 @@
 """A node of ROS 2: drives the machine over the bridge, and reads its state. Each function is one test; see main.rs."""
 
 import math
+import os
+import signal
 import sys
 import time
 
 import rclpy
 from geometry_msgs.msg import AccelStamped, PoseStamped, Transform, Twist, TwistStamped
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
@@ -124,26 +126,31 @@ def follows(source, seconds=6.0):
     assert max(heights) < 1.2 * AMPLITUDE and min(heights) > -1.2 * AMPLITUDE, (min(heights), max(heights))
 
 
+STATE = {"/joint_states": JointState, "/pose": PoseStamped, "/twist": TwistStamped, "/acceleration": AccelStamped}
+LEGS = range(1, 7)
+JOINTS = ["prismatic_%d" % leg for leg in LEGS] + ["universal_%s_%d" % (axis, leg) for leg in LEGS for axis in ("first", "second")]
+
+
 def state():
-    # Measured lengths and the angles of universal joints are two messages.
-    node.create_subscription(JointState, "/joint_states", lambda message: newest.update({message.name[0]: message}), qos_profile_sensor_data)
-    for topic, kind in [("/pose", PoseStamped), ("/twist", TwistStamped), ("/acceleration", AccelStamped)]:
+    for topic, kind in STATE.items():
         listen(topic, kind)
-    wait("state", lambda: len(newest) == 5)
+    wait("state", lambda: len(newest) == len(STATE) and newest["/joint_states"].name == JOINTS)
 
 
 def check_state():
-    angles = newest["universal_first_1"]
-    assert len(angles.name) == 12 and max(map(abs, angles.position)) < 0.01, "at home they are 0"
-    joints = newest["prismatic_1"]
-    assert joints.name == ["prismatic_%d" % (leg + 1) for leg in range(6)], joints.name
-    assert all(1.1 < length < 2.3 for length in joints.position) and len(joints.velocity) == 6, joints
+    joints = newest["/joint_states"]
+    assert max(map(abs, joints.position[6:])) < 0.01, "at home they are 0"
+    assert all(1.1 < length < 2.3 for length in joints.position[:6]), joints
+    assert len(joints.velocity) == 18 and len(joints.effort) in (0, 18), joints
     assert newest["/pose"].header.frame_id == "base" and abs(newest["/pose"].pose.position.z - HOME_Z) < 1e-3
     age = time.time() - joints.header.stamp.sec - joints.header.stamp.nanosec * 1e-9
     assert 0.0 < age < 5.0, age
     # Nodes and topics become known one by one.
     wait("the topic /tf", lambda: ("/tf", ["tf2_msgs/msg/TFMessage"]) in node.get_topic_names_and_types())
     wait("the name of the node", lambda: "hexad_ros2" in node.get_node_names())
+    # Of ROS itself, and of the bridge: none besides.
+    topics = {"/parameter_events", "/rosout", "/tf", "/setpoint_pose", "/setpoint_trajectory", *STATE}
+    assert {name for name, _ in node.get_topic_names_and_types()} == topics, node.get_topic_names_and_types()
 
 
 def poses():
@@ -163,6 +170,53 @@ def poses():
     assert answer.success and answer.message == "standby", answer
     parks = node.create_client(Trigger, "/park")
     assert not parks.wait_for_service(timeout_sec=1.0), "not among the requests of the file"
+
+
+def readers():
+    """Readers of each kind take every message, by the numbers that the publisher gave them, and each sample of the joints is whole."""
+    state()
+    for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
+        for depth in (1, 10):
+            for subscription in list(node.subscriptions):
+                node.destroy_subscription(subscription)
+            numbers, joints = {topic: [] for topic in STATE}, set()
+
+            def take(topic, message, info):
+                numbers[topic].append(info["publication_sequence_number"])
+                if topic == "/joint_states":
+                    joints.add(tuple(message.name))
+
+            quality = QoSProfile(depth=depth, reliability=reliability)
+            callbacks = {topic: lambda message, info, topic=topic: take(topic, message, info) for topic in STATE}
+            for topic, kind in STATE.items():
+                node.create_subscription(kind, topic, callbacks[topic], quality)
+            wait("messages", lambda: all(numbers.values()))
+            spin(3.0)
+            sent = {topic: taken[-1] - taken[0] + 1 for topic, taken in numbers.items()}
+            assert 75 < max(sent.values()) < min(sent.values()) + 15, ("one message per sample, 3 s at 50 Hz", sent)
+            for topic, taken in numbers.items():
+                print(reliability.name, "depth", depth, topic, "sent", sent[topic], "taken", len(taken), flush=True)
+                # On a busy host, pauses of a process leave more messages than a queue keeps.
+                assert sent[topic] - len(taken) <= sent[topic] // 5, (topic, sent, len(taken))
+            assert joints == {tuple(JOINTS)}, joints
+
+
+def stops_itself():
+    node.create_subscription(JointState, "/joint_states", lambda message: newest.update(joints=message), 10)
+    wait("joints", lambda: newest)
+    print("reads", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def others_read():
+    poses = []
+    node.create_subscription(PoseStamped, "/pose", poses.append, qos_profile_sensor_data)
+    # At 1 kHz. The bridge would wait 100 ms for the stopped reader from its 8192nd message on.
+    spin(13.0)
+    poses.clear()
+    spin(2.0)
+    print("poses in 2 s", len(poses), flush=True)
+    assert len(poses) > 200, len(poses)
 
 
 def new_clients():
