@@ -29,7 +29,8 @@ fn setpoints_beyond_the_limits_end_in_a_stop_unless_the_policy_is_limit() {
     assert_eq!(policy("limit").setpoint.on_violation, ViolationPolicy::Limit);
     let message = |value| format!("setpoint.on_violation = {value}: must be one of \"stop\", \"limit\"");
     refused_each(FRIED, ["\"clip\"", "\"Limit\"", "\"\"", "true", "1"].map(message));
-    let unknown = "setpoint.policy = 1: unknown key, must be one of: on_violation, approach, on_return";
+    let unknown =
+        "setpoint.policy = 1: unknown key, must be one of: on_violation, approach, on_return, clock";
     refused_each(FRIED, [unknown]);
 }
 

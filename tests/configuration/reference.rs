@@ -74,7 +74,7 @@ fn the_reference_gives_the_defaults() {
             Err(other) => panic!("{other}"),
         }
     }
-    // 11 sections with 13 + 15 + 3 + 2 + 12 + 3 + 3 + 3 + 1 + 5 + 0 keys, 5 of the actuator, 3 of the inertia, one of home, one for each leg, the frames, 6 sections
+    // 11 sections with 13 + 15 + 3 + 2 + 12 + 4 + 3 + 3 + 1 + 5 + 0 keys, 5 of the actuator, 3 of the inertia, one of home, one for each leg, the frames, 6 sections
     // of the plant with 2 + 4 + 2 + 4 + 3 + 3 keys.
-    assert_eq!(optional.len(), 11 + 60 + 5 + 3 + 1 + 6 + 1 + 6 + 18, "{optional:?}");
+    assert_eq!(optional.len(), 11 + 61 + 5 + 3 + 1 + 6 + 1 + 6 + 18, "{optional:?}");
 }

@@ -3,6 +3,7 @@
 use std::mem::{Discriminant, discriminant};
 use std::time::{Duration, Instant};
 
+use hexad_client::messages::source_clock::NoInstant;
 use tracing::warn;
 
 /// Shortest time between two lines of the log with one reason.
@@ -38,12 +39,9 @@ pub enum Rejection {
     /// Beyond the present.
     #[error("its point is {0:.3} s after its stamp; must be in [0, timeouts.setpoint_ms = {1:.0} ms]")]
     Ahead(f64, f64),
-    /// Late.
-    #[error(
-        "it is later than the stream by more than timeouts.setpoint_ms = {0:.0} ms, or its stamp is not newer than the last one's: \
-         stamp each message with the clock; if that clock was set back, start the source again"
-    )]
-    Late(f64),
+    /// Late, or of a stamp that has no instant.
+    #[error(transparent)]
+    Clock(#[from] NoInstant),
     /// A message from before the present life of its source.
     #[error(
         "its epoch {0} is before that of the source, {1}: it was sent before, or the clock was set back; start the source again"

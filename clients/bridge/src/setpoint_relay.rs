@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
-use hexad_client::messages::source_clock::SourceClock;
+use hexad_client::messages::source_clock::{SourceClock, SourceInstant};
 use hexad_client::messages::{Bus, PortError, Publisher, SetpointMessage};
 use hexad_core::control::parameters::ViolationPolicy;
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
@@ -83,13 +83,15 @@ impl<'a, Id: Ord + Clone + Debug> SetpointRelay<'a, Id> {
         if !(0..=timeout_ns as i64).contains(&ahead_ns) {
             return Err(Rejection::Ahead(ahead_ns as f64 * 1e-9, timeout_ns as f64 * 1e-6));
         }
-        let instant_ns = source.clock.instant_ns(stamp_ns, arrival_ns as i64, timeout_ns as i64);
-        let instant_ns = instant_ns.ok_or(Rejection::Late(timeout_ns as f64 * 1e-6))?;
+        let SourceInstant { time_ns, rate } = source.clock.instant(stamp_ns, arrival_ns as i64)?;
         source.seen_ns = arrival_ns;
-        let time_ns = instant_ns.saturating_add(ahead_ns) as u64;
-        self.newest = Some(Setpoint { kind, ..Setpoint::motion(time_ns, task) });
+        let time_ns = time_ns.saturating_add((ahead_ns as f64 / rate) as i64) as u64;
+        self.newest = Some(Setpoint { kind, ..Setpoint::motion(time_ns, task.at_rate(rate)) });
         if self.followed.replace(id.clone()).is_none() {
-            info!("follows the source {id:?}");
+            let clock = self.config.deployment.setpoint.clock;
+            info!(
+                "follows the source {id:?}: setpoint.clock is {clock:?}, its clock runs at {rate:.3} of real time"
+            );
         }
         Ok(())
     }
@@ -124,7 +126,8 @@ impl<'a, Id: Ord + Clone + Debug> SetpointRelay<'a, Id> {
             let silent = self.sources.iter().min_by_key(|(_, source)| source.seen_ns);
             silent.map(|(id, _)| id.clone()).and_then(|id| self.sources.remove(&id));
         }
-        let new = || Source { clock: SourceClock::default(), seen_ns: now_ns, due_ns: 0 };
+        let clock = || SourceClock::new(self.config.deployment.setpoint.clock, self.timeout_ns as i64, false);
+        let new = || Source { clock: clock(), seen_ns: now_ns, due_ns: 0 };
         self.sources.entry(id.clone()).or_insert_with(new)
     }
 }
@@ -132,6 +135,7 @@ impl<'a, Id: Ord + Clone + Debug> SetpointRelay<'a, Id> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hexad_client::messages::source_clock::NoInstant;
 
     const MS: u64 = 1_000_000;
 
@@ -161,7 +165,7 @@ mod tests {
         let messages =
             [(1, 1000, 9000), (1, 1010, 9010), (1, 1020, 14_020), (1, 1030, 17_000), (1, 9_100, 17_100)];
         let found = rejections(&messages);
-        let late = Some(Rejection::Late(100.0));
+        let late = Some(Rejection::Clock(NoInstant::Late(100.0)));
         assert_eq!(found, [None, None, late.clone(), late, None]);
     }
 

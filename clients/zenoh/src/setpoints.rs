@@ -84,6 +84,7 @@ mod tests {
     use hexad_machine::config::Config;
 
     use super::*;
+    use hexad_client::messages::source_clock::NoInstant;
 
     fn message(epoch: u64, stamp_ms: u64) -> SetpointMessage {
         let header = Header {
@@ -127,8 +128,8 @@ mod tests {
         assert_eq!(add(message(5, 100), 9000), Ok(()));
         assert_eq!(add(message(5, 110), 9010), Ok(()));
         // Of the same life, while it is followed and afterwards; of an earlier life.
-        assert_eq!(add(message(5, 100), 9020), Err(Rejection::Late(100.0)));
-        assert_eq!(add(message(5, 110), 9500), Err(Rejection::Late(100.0)));
+        assert_eq!(add(message(5, 100), 9020), Err(Rejection::Clock(NoInstant::Late(100.0))));
+        assert_eq!(add(message(5, 110), 9500), Err(Rejection::Clock(NoInstant::Late(100.0))));
         assert_eq!(add(message(4, 999), 9500), Err(Rejection::PastEpoch(4, 5)));
         assert_eq!(add(message(6, 1), 9500), Ok(()));
         let target = SetpointMessage { kind: 2, ..message(6, 2) };

@@ -53,6 +53,11 @@ impl TaskState {
         }
     }
 
+    /// The same state with derivatives with respect to a time that runs `rate` times as fast as theirs.
+    pub fn at_rate(&self, rate: f64) -> Self {
+        Self { x: self.x, xd: self.xd * rate, xdd: self.xdd * rate * rate }
+    }
+
     /// Pose, twist and acceleration in base axes.
     pub fn motion(&self) -> Motion {
         let [alpha, beta, gamma, x, y, z] = self.x.into();

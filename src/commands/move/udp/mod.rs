@@ -16,13 +16,13 @@ use tracing::{info, warn};
 
 use self::datagram_format::{Datagram, DatagramFormat, FormatError, MAX_BYTES};
 use self::rejection::{Rejection, RejectionCounts};
-use self::restarting_clock::RestartingClock;
 use self::status_feed::StatusFeed;
 use super::PlaybackOptions;
 use crate::commands::failure::{CommandError, INTERRUPTED, default_exit_code};
 use crate::commands::quantity::{angle, length, list};
 use hexad_client::messages::Bus;
 use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::source_clock::SourceClock;
 use hexad_client::operator::requests::status;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::parameters::ViolationPolicy;
@@ -35,7 +35,6 @@ use hexad_machine::config::Config;
 
 mod datagram_format;
 mod rejection;
-mod restarting_clock;
 mod status_feed;
 
 /// Longest time without datagrams before the platform comes to rest \[s\], if `timeouts.setpoint_ms` does not bound it.
@@ -223,8 +222,7 @@ struct Receiver {
     format: DatagramFormat,
     from: Vec<IpAddr>,
     home: [f64; 6],
-    clock: RestartingClock,
-    max_age_ns: i64,
+    clock: SourceClock,
     pause_s: f64,
     /// Arrival of the last datagram \[ns\].
     last_ns: u64,
@@ -255,8 +253,7 @@ impl Receiver {
             format,
             from: options.from.clone(),
             home: config.machine.home,
-            clock: RestartingClock::default(),
-            max_age_ns: (timeout_s * 1e9) as i64,
+            clock: SourceClock::new(config.deployment.setpoint.clock, (timeout_s * 1e9) as i64, true),
             pause_s: PAUSE_S.min(PAUSE_SHARE * timeout_s),
             last_ns: 0,
             lively: 0,
@@ -296,7 +293,12 @@ impl Receiver {
     fn description(&self) -> String {
         match (self.accepted, &self.rejected) {
             (0, none) if *none == RejectionCounts::default() => "no datagram has arrived".into(),
-            (accepted, rejected) => format!("{accepted} datagrams accepted{rejected}"),
+            (accepted, rejected) => {
+                let rate = self.clock.rate().filter(|rate| *rate != 1.0);
+                let clock = rate
+                    .map_or_else(String::new, |rate| format!("; their clock runs at {rate:.3} of real time"));
+                format!("{accepted} datagrams accepted{clock}{rejected}")
+            }
         }
     }
 
@@ -311,9 +313,10 @@ impl Receiver {
         }
         let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
         let Datagram { stamp_s, x } = datagram?;
-        let instant =
-            |stamp_s: f64| self.clock.instant_ns((stamp_s * 1e9) as i64, arrival_ns as i64, self.max_age_ns);
-        let time_ns = stamp_s.map_or(Some(arrival_ns as i64), instant).ok_or(Rejection::Late)?;
+        let time_ns = match stamp_s {
+            Some(stamp_s) => self.clock.instant((stamp_s * 1e9) as i64, arrival_ns as i64)?.time_ns,
+            None => arrival_ns as i64,
+        };
         let is_pause = self.silence_s(arrival_ns) > self.pause_s;
         self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
         (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);

@@ -3,6 +3,7 @@
 use core::fmt;
 use core::mem::discriminant;
 
+use hexad_client::messages::source_clock::NoInstant;
 use hexad_machine::text::excerpt::{excerpt, stranger};
 use hexad_machine::text::numbers::significant;
 
@@ -46,9 +47,9 @@ pub enum Rejection {
     /// Beyond the range of the format.
     #[error("{name} = {} {unit} is not in its range [{}, {}]", significant(*value), significant(*low), significant(*high))]
     Range { name: &'static str, value: f64, low: f64, high: f64, unit: String },
-    /// Late.
-    #[error("it is late against the stream, or older than the newest")]
-    Late,
+    /// Late, or of a stamp that has no instant.
+    #[error(transparent)]
+    Clock(#[from] NoInstant),
 }
 
 impl Rejection {
@@ -69,7 +70,11 @@ pub struct RejectionCounts(Vec<(Rejection, u64)>);
 impl RejectionCounts {
     /// Counts one. Whether it is the first of its kind.
     pub fn add(&mut self, rejection: &Rejection) -> bool {
-        let known = self.0.iter_mut().find(|(known, _)| discriminant(known) == discriminant(rejection));
+        let kind = |rejection: &Rejection| match rejection {
+            Rejection::Clock(reason) => (discriminant(rejection), Some(discriminant(reason))),
+            other => (discriminant(other), None),
+        };
+        let known = self.0.iter_mut().find(|(known, _)| kind(known) == kind(rejection));
         let Some((_, count)) = known else {
             self.0.push((rejection.clone(), 1));
             return true;

@@ -16,6 +16,7 @@ use super::control_loops::bounded_age_s;
 use super::machine::rounded;
 use super::reader::SectionReader;
 use crate::analysis::envelope;
+use hexad_client::messages::source_clock::ClockRule;
 use hexad_core::control::parameters::ViolationPolicy;
 use hexad_core::control::supervision::in_position::InPositionWindow;
 use hexad_core::model::inverse_jacobian::leg_wrenches;
@@ -85,6 +86,8 @@ pub struct SetpointPolicy {
     pub approach: bool,
     /// Whether a source that is back, away from the platform, is followed only after the request `engage`.
     pub holds_on_return: bool,
+    /// What the stamps of remote sources are.
+    pub clock: ClockRule,
 }
 
 /// Section `[timeouts]`: largest ages of the newest messages.
@@ -133,8 +136,14 @@ fn setpoint(mut section: SectionReader) -> SetpointPolicy {
     let on_violation = section.choice_or("on_violation", ViolationPolicy::Stop, &policies);
     let approach = section.flag_or("approach", false);
     let holds_on_return = section.choice_or("on_return", false, &[("follow", false), ("hold", true)]);
+    let clocks = [
+        ("real_time", ClockRule::RealTime),
+        ("any_rate", ClockRule::AnyRate),
+        ("arrival", ClockRule::Arrival),
+    ];
+    let clock = section.choice_or("clock", ClockRule::RealTime, &clocks);
     section.finish();
-    SetpointPolicy { on_violation, approach, holds_on_return }
+    SetpointPolicy { on_violation, approach, holds_on_return, clock }
 }
 
 fn in_position(mut section: SectionReader, noise: &SensorNoise, machine: &Machine) -> InPositionWindow {

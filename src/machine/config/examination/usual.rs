@@ -25,7 +25,7 @@ struct Ratio {
 pub(super) fn examine(examiner: &mut Examiner) {
     let gravity = examiner.config.machine.gravity.norm();
     if gravity != 0.0 && !(9.7..=9.9).contains(&gravity) {
-        let bound = "on the Earth it is 9.76 to 9.84 m/s^2, in space 0: check its unit, or the site";
+        let bound = "on the Earth it is 9.76 to 9.84 m/s^2, in space 0; check its unit, or the site";
         examiner.warn("gravity_m_s2", format!("{} long", rounded(gravity)), bound);
     }
     let ratios = [body_ratios(examiner), drive_ratios(examiner), deployment_ratios(examiner)].concat();
@@ -34,7 +34,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
         if ratio == 0.0 || !ratio.is_finite() || usual.contains(&ratio) || !examiner.is_stated(key) {
             continue;
         }
-        let bound = format!("usual is {} to {}: check the unit of both", usual.start(), usual.end());
+        let bound = format!("usual is {} to {}; check the units", usual.start(), usual.end());
         examiner.warn(key, format!("{} times {of}", rounded(ratio)), bound);
     }
 }
@@ -62,7 +62,7 @@ fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let middle = base.iter().sum::<Vector3<f64>>() / LEGS as f64;
     let base_radius = base.iter().map(|joint| (joint - middle).norm()).sum::<f64>() / LEGS as f64;
     const LENGTH: &str = "actuator.min_length_m";
-    const GYRATION: &str = "actuator.min_length_m as radius of gyration, from inertia and mass";
+    const GYRATION: &str = "actuator.min_length_m (radius of gyration by inertia and mass)";
     let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
     vec![
         ratio(
@@ -80,7 +80,7 @@ fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
         ratio(
             "platform.inertia_kg_m2",
             gyration / radius,
-            "the radius of the joints as radius of gyration, from inertia and mass",
+            "the radius of the joints (radius of gyration by inertia and mass)",
             0.25..=2.5,
         ),
         ratio("leg", base_radius / radius, "platform_m (radii of the joints by base_m)", 0.3..=8.0),
