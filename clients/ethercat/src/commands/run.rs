@@ -13,7 +13,7 @@ use hexad_ethercat::topics::Topics;
 use tracing::{info, warn};
 
 use super::bus::{leave, operational, test_brakes};
-use super::{Failure, after_start, before_start, load_drives, load_machine, none_of};
+use super::{Failure, after_start, before_start, load_and_warn, load_machine, none_of};
 
 /// Below the daemon's priorities, 80 and 79.
 const PRIORITY: i32 = 70;
@@ -23,7 +23,7 @@ const FIRST_EXCHANGES: u32 = 10;
 const END_CYCLES: u32 = 500;
 
 pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
-    let (file, machine) = (load_drives(drives)?, load_machine(machine)?);
+    let (file, machine) = (load_and_warn(drives)?, load_machine(machine)?);
     none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
     let stop = Stop::on_signals().map_err(before_start)?;
     let topics = Topics::join(&machine.name).map_err(before_start)?;

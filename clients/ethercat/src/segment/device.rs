@@ -7,7 +7,7 @@ use super::object_dictionary::{MappedObject, ObjectDictionary};
 use super::servo_drive::{DriveCommand, ServoDrive};
 use super::sii;
 use crate::al_state::{INIT, OP, SAFE_OP};
-use crate::inventory::Identity;
+use crate::identity::Identity;
 use crate::objects;
 use crate::units::LegUnits;
 
