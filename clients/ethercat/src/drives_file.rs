@@ -68,6 +68,8 @@ pub struct LegSection {
     pub jogged_position: Option<usize>,
     /// Of the motor's encoder.
     pub counts_per_rev: f64,
+    /// Bits of its position, single-turn and multi-turn together.
+    pub position_bits: u32,
     /// Revolutions of the motor for one of the screw.
     pub gear: f64,
     /// Travel for one revolution of the screw.
@@ -135,6 +137,7 @@ on_brake = "quick_stop"
 /// The same of a leg.
 const LEG_DEFAULTS: &str = r#"
 identity = "serial"
+position_bits = 32
 gear = 1.0
 efficiency = 1.0
 sdo = []
@@ -268,6 +271,7 @@ impl LegSection {
             &[
                 ("position", self.position as f64, 1.0, LEGS as f64),
                 ("counts_per_rev", self.counts_per_rev, 100.0, 1e9),
+                ("position_bits", self.position_bits.into(), 8.0, 32.0),
                 ("gear", self.gear, 0.01, 1000.0),
                 ("lead_m", self.lead_m, 1e-4, 1.0),
                 ("efficiency", self.efficiency, 0.1, 1.0),
@@ -300,6 +304,7 @@ impl LegSection {
     pub fn units(&self) -> LegUnits {
         LegUnits {
             counts_per_rev: self.counts_per_rev,
+            position_bits: self.position_bits,
             gear: self.gear,
             lead_m: self.lead_m,
             efficiency: self.efficiency,

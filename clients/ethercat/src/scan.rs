@@ -17,7 +17,7 @@ pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str
          # lead_m = ?        # travel for one revolution of the screw\n# sign = ?          # 1 or -1, see jog\n\
          # offset_m = ?      # length at count 0, see zero\n\
          # brake = ?         # {{ status_bit = 12 }}, {{ input_bit = 16 }} or {{ open_ms = 200 }}\n\
-         gear = 1.0\nefficiency = 1.0\n"
+         position_bits = 32  # of the encoder: single-turn + multi-turn\ngear = 1.0\nefficiency = 1.0\n"
     );
     let all = identities(bus, devices);
     for (position, identity) in all.iter().enumerate() {

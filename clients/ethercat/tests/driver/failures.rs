@@ -264,20 +264,22 @@ fn a_daemon_that_stalls_for_a_moment_changes_nothing() {
 
 #[test]
 fn an_encoder_may_wrap_in_the_middle_of_the_stroke() {
-    let file = drives();
     let home_m = hexad_core::model::inverse_geometry::leg_lengths(
         &machine().machine,
         &hexad_core::model::task::TaskState::at_rest(machine().machine.home).motion().pose,
     )[0];
-    let range_m = file.legs[0].units().metres_per_count() * 2f64.powi(31);
-    let text = DRIVES.replace("offset_m = 1.2", &format!("offset_m = {}", home_m + 0.001 - range_m));
-    let file = hexad_ethercat::drives_file::DrivesFile::parse(&text, "wrapping").unwrap();
-    let frames = Frames::new();
-    let segment = hexad_ethercat::simulation::segment(&file, &machine(), START_NS);
-    let mut rig = Rig::new(&frames, &file, segment);
-    rig.engage_and_move();
-    rig.cycles(8000);
-    assert_eq!(rig.state(), State::Active, "{:?}", rig.driver.daemon.output.diagnostic);
+    // 17 bits single-turn and 12 bits multi-turn, zero-extended to the 32 bits of the object.
+    let of_29_bits = DRIVES.replace("= 1048576", "= 131072\nposition_bits = 29");
+    for (text, half_range_m) in [(DRIVES, 40.96), (&of_29_bits, 40.96), (&of_29_bits, 81.92)] {
+        let text = text.replace("offset_m = 1.2", &format!("offset_m = {}", home_m + 0.001 - half_range_m));
+        let file = hexad_ethercat::drives_file::DrivesFile::parse(&text, "wrapping").unwrap();
+        let frames = Frames::new();
+        let segment = hexad_ethercat::simulation::segment(&file, &machine(), START_NS);
+        let mut rig = Rig::new(&frames, &file, segment);
+        rig.engage_and_move();
+        rig.cycles(8000);
+        assert_eq!(rig.state(), State::Active, "{:?}", rig.driver.daemon.output.diagnostic);
+    }
 }
 
 #[test]
