@@ -189,8 +189,9 @@ pub fn reset(drives: &Path) -> Result<(), Failure> {
         for (drive, outputs) in data.drives.iter_mut().zip(&mut data.outputs) {
             *outputs = drive.command(goal, 0.0);
         }
-        if data.next_exchange(&mut bus, &devices) == Exchange::Incomplete {
-            return Err(after_start("a drive is missing or has left OP"));
+        let exchange = data.next_exchange(&mut bus, &devices);
+        if let Some(cause) = data.stop_cause(exchange).filter(|_| exchange == Exchange::Incomplete) {
+            return Err(after_start(cause));
         }
     }
     leave(bus, devices);

@@ -138,7 +138,7 @@ brake_hold = [{ index = 0x60fe, sub = 1, bytes = 4, value = 1 }, { index = 0x60f
                     sleep(Duration::from_millis(20));
                 }
                 let log = network.log(command);
-                !log.contains("frames do not come back") && !log.contains("has the fault 0x7500: reset it")
+                !log.contains("frames in a row are lost") && !log.contains("has the fault 0x7500: reset it")
             });
             if !is_complete {
                 return not_run::not_run(
