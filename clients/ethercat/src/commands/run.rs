@@ -68,25 +68,24 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
         scope.spawn(|| log_changes(shown, &has_ended));
         let allocations = calls_of_this_thread();
         let outcome = loop {
-            if let Err(lost) = driver.cycle(&mut bus, &devices) {
-                break Err(lost.to_string());
-            }
+            let outcome = driver.cycle(&mut bus, &devices);
             counts.write(driver.counts);
-            if let Some(error) = driver.daemon.failure.take() {
-                break Err(error.to_string());
-            }
-            if stop.is_requested() {
-                break Ok(());
+            if outcome.is_err() || driver.daemon.failure.is_some() || stop.is_requested() {
+                break outcome;
             }
         };
+        let failure = driver.daemon.failure.take();
         driver.end();
         for _ in 0..END_CYCLES {
             if driver.cycle(&mut bus, &devices).is_err() {
                 break;
             }
         }
+        let allocations = calls_of_this_thread() - allocations;
         has_ended.store(true, Ordering::Relaxed);
-        (outcome.map_err(after_start), calls_of_this_thread() - allocations)
+        let outcome =
+            outcome.map_err(after_start).and(failure.map_or(Ok(()), |error| Err(after_start(error))));
+        (outcome, allocations)
     });
     let lost_frames = driver.data.lost_frames;
     info!(counts = ?driver.counts, lost_frames, late_frames = bus.wire.unmatched_frames, allocations, "the driver ends");
