@@ -21,7 +21,7 @@ use crate::process_data::{Exchange, ProcessData, StopCause};
 use crate::startup::{FIRST_ADDRESS, OpDevices};
 
 /// Interval at which the driver looks for the forces \[ns\].
-const POLL_NS: u64 = 10_000;
+pub(crate) const POLL_NS: u64 = 10_000;
 /// Time that the second exchange needs before SYNC0, as a share of the period.
 const SECOND_EXCHANGE_SHARE: u64 = 8;
 /// Cycles between attempts to bring a device back to OP, and cycles for which a fault is acknowledged.

@@ -33,12 +33,12 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
     let (file, machine) = (load_and_warn(drives)?, load_machine(machine)?);
     none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
     let stop = Stop::on_signals().map_err(before_start)?;
-    let topics = Topics::join(&machine.name).map_err(before_start)?;
     memory::keep_heap();
     let report = |result: Result<(), Shortfall>| result.unwrap_or_else(|shortfall| warn!("{shortfall}"));
     report(memory::lock_all());
     scheduling::set_shortest_timer_slack();
     report(scheduling::fifo_priority(PRIORITY));
+    let topics = Topics::join(&machine.name, u64::from(file.bus.answer_us) * 1000).map_err(before_start)?;
     test_brakes(&file, &machine, &stop)?.map_err(before_start)?;
     let frames = Frames::new();
     let actuator = &machine.machine.actuator;
@@ -70,11 +70,10 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
         let outcome = loop {
             let outcome = driver.cycle(&mut bus, &devices);
             counts.write(driver.counts);
-            if outcome.is_err() || driver.daemon.failure.is_some() || stop.is_requested() {
+            if outcome.is_err() || driver.daemon.has_failed() || stop.is_requested() {
                 break outcome;
             }
         };
-        let failure = driver.daemon.failure.take();
         driver.end();
         for _ in 0..END_CYCLES {
             if driver.cycle(&mut bus, &devices).is_err() {
@@ -83,9 +82,7 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
         }
         let allocations = calls_of_this_thread() - allocations;
         has_ended.store(true, Ordering::Relaxed);
-        let outcome =
-            outcome.map_err(after_start).and(failure.map_or(Ok(()), |error| Err(after_start(error))));
-        (outcome, allocations)
+        (outcome.map_err(after_start).and(driver.daemon.end().map_err(after_start)), allocations)
     });
     let lost_frames = driver.data.lost_frames;
     info!(counts = ?driver.counts, lost_frames, late_frames = bus.wire.unmatched_frames, allocations, "the driver ends");
