@@ -54,23 +54,18 @@ impl Topics {
             block_signals();
             // The caller reports if it may not have its own.
             let _ = fifo_priority(PRIORITY);
-            let open = || {
-                let bus = Bus::join(&name)?;
-                Ok((bus.publisher()?, bus.subscriber(8)?))
-            };
-            let ports =
-                open().map(|(publisher, subscriber)| Ports { publisher, subscriber, measured, forces });
-            let (ports, outcome) = match ports {
-                Ok(ports) => (Some(ports), Ok(())),
-                Err(error) => (None, Err(error)),
-            };
+            let bus = Bus::join(&name)?;
+            let (publisher, subscriber) = (bus.publisher()?, bus.subscriber(8)?);
             // The receiver waits for it.
-            let _ = opened.send(outcome);
-            ports.map_or(Ok(()), |ports| ports.serve(&theirs, answer_ns))
+            let _ = opened.send(());
+            Ports { publisher, subscriber, measured, forces }.serve(&theirs, answer_ns)
         });
-        // The thread sends before it ends.
-        outcome.recv().unwrap_or(Ok(()))?;
-        Ok(Self { measured: measured_writer, forces: forces_reader, shared, thread: Some(thread) })
+        let mut topics =
+            Self { measured: measured_writer, forces: forces_reader, shared, thread: Some(thread) };
+        match outcome.recv() {
+            Ok(()) => Ok(topics),
+            Err(_) => topics.end().map(|()| topics),
+        }
     }
 
     /// Whether a message could not be sent.

@@ -149,10 +149,7 @@ impl Controller {
 
         // Validate inputs.
         let clock = stamp_clock.check(&cycle, input.clock_offset_ns);
-        let newest = input.measurement.as_ref();
-        let has_bus_failed = newest.is_some_and(|newest| newest.drives.has_bus_failed());
-        let bus = if has_bus_failed { Err(DiagnosticCode::DriveBusFailed.into()) } else { clock };
-        let measurement = bus.and(measurements.validate(&cycle, newest.filter(|_| !has_bus_failed)));
+        let measurement = clock.and(measurements.validate(&cycle, input.measurement.as_ref()));
         let setpoint = setpoints.validate(&cycle, input, supervisor.holds_pose(), reference);
         let reported = measurement.as_ref().ok().copied();
         let reports = [drives.check(&cycle, reported), external_pose.check(&cycle, reported)];

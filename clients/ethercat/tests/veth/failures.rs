@@ -118,7 +118,7 @@ fn processes_that_are_killed_or_stopped_in_motion() {
         let Some((before, rate_m_s)) = signalled else {
             let pause = watchdog.largest();
             let is_host =
-                network.log("run").contains("frames in a row are lost") || pause > Duration::from_millis(1);
+                network.log("run").contains("in a row are lost") || pause > Duration::from_millis(1);
             assert!(is_host, "{pause:?}\n{}", network.ends());
             return not_run::not_run("the host delays the frames of a loop of 1 kHz, three times in a row");
         };
@@ -157,7 +157,6 @@ fn processes_that_are_killed_or_stopped_in_motion() {
         recover(&mut network);
     }
     network.signal("run", libc::SIGINT);
-    network.wait_for("run", "the driver ends", 1);
     // Also while the daemon was killed and another came.
-    assert!(network.log("run").contains("allocations=0"), "{}", network.ends());
+    network.wait_for("run", "allocations=0", 1);
 }

@@ -96,10 +96,6 @@ impl DriveStatus {
     /// Bit of `fault` of a driver whose bus to the drives failed: the lengths beside it are no measurement.
     pub const BUS_FAILED: u32 = 1 << LEGS;
 
-    pub(in crate::control) fn has_bus_failed(&self) -> bool {
-        self.fault.unwrap_or_default() & Self::BUS_FAILED != 0
-    }
-
     /// The first drive that is not enabled, or whose brake is closed.
     pub(in crate::control) fn first_unready_leg(&self) -> Option<usize> {
         let ready = self.enabled.unwrap_or(u32::MAX) & self.brake_open.unwrap_or(u32::MAX);
