@@ -1,5 +1,6 @@
 //! The daemon over its topics. A thread of its own uses the ports: they allocate when a peer appears or disappears, and the cycle must not.
 
+use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -77,7 +78,7 @@ impl Topics {
     pub fn end(&mut self) -> Result<(), PortError> {
         self.shared.stop.store(true, Ordering::Relaxed);
         self.shared.event.signal();
-        self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or(Ok(()))
+        self.thread.take().map_or(Ok(()), |thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
     }
 }
 

@@ -190,6 +190,34 @@ fn commands_that_use_the_bus_for_a_moment() {
 }
 
 #[test]
+fn commands_that_move_or_measure_refuse_drives_without_serial_numbers() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut network) = simulated("serials", " --uncoupled") else { return };
+    let file = fs::read_to_string(network.path("d.toml")).unwrap();
+    let file =
+        (101..=106).fold(file, |file, serial| file.replace(&format!("serial = {serial}"), "serial = 0"));
+    fs::write(network.path("d.toml"), &file).unwrap();
+    network.start("simulate", network.driver("simulate d.toml m.toml --interface ec1 --uncoupled"));
+    network.wait_for("simulate", "switched on", 1);
+    for arguments in
+        ["check d.toml", "zero d.toml 1 --length-m 1.7", "jog d.toml 1 --unloaded", "run d.toml m.toml"]
+    {
+        let ended = network.driver(arguments).output().unwrap();
+        let text = String::from_utf8_lossy(&ended.stderr);
+        assert!(!ended.status.success() && text.contains("leg 1: its drive has no serial number"), "{text}");
+    }
+    assert_eq!(fs::read_to_string(network.path("d.toml")).unwrap(), file);
+    let accepted =
+        file.replace("[drive]", "[drive]\nidentity = \"position\"").replace("jogged_serial = 0\n", "");
+    fs::write(network.path("d.toml"), accepted).unwrap();
+    network.output(network.driver("jog d.toml 1 --unloaded"));
+    assert!(
+        network.output(network.driver("zero d.toml 1 --length-m 1.7")).contains("of no serial number (0)")
+    );
+    assert!(fs::read_to_string(network.path("d.toml")).unwrap().contains("jogged_position = 1"));
+}
+
+#[test]
 fn soem_brings_the_drives_to_op() {
     let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let environment = match python::environment(&["pysoem==1.1.13".into()]) {
