@@ -1,13 +1,13 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
 use hexad::control::signals::diagnostic::DiagnosticCode::{
-    self, DaemonHeld, DeadlineMissed, DisturbanceLasting, DriveFault, DriveForceMissing, DriveNotReady,
-    EmergencyStop, ExternalPoseMismatch, HoldingPose, Impact, LengthOutOfStroke, MeasurementImplausible,
-    MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, MeasurementTooOld,
-    OperatorRequest, Oscillation, PayloadChanged, RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen,
-    SetpointBeyondLimits, SetpointEnded, SetpointJumped, SetpointLost, SetpointNotFinite,
-    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFast, StampClockInvalid,
-    VelocityError,
+    self, DaemonHeld, DeadlineMissed, DisturbanceLasting, DriveBusFailed, DriveFault, DriveForceMissing,
+    DriveNotReady, EmergencyStop, ExternalPoseMismatch, HoldingPose, Impact, LengthOutOfStroke,
+    MeasurementImplausible, MeasurementJumped, MeasurementLost, MeasurementNotFinite,
+    MeasurementStampInvalid, MeasurementTooOld, OperatorRequest, Oscillation, PayloadChanged,
+    RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointEnded,
+    SetpointJumped, SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach,
+    SetpointStampInvalid, SetpointTooFast, StampClockInvalid, VelocityError,
 };
 use hexad::control::signals::state::State;
 
@@ -107,6 +107,7 @@ pub const ROWS: &[Row] = &[
         Idle(State::Standby, DriveFault), Brake(DriveFault), Brake(DriveFault), Brake(DriveFault),
         Brake(DriveFault), Brake(DriveFault), On,
     ]),
+    ("the bus to the drives fails", reports::bus_failed, GENTLE, unusable_measurement(DriveBusFailed)),
     ("a drive reports half of its force", reports::half_of_a_force, GENTLE, [
         On, Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing),
         Brake(DriveForceMissing), Brake(DriveForceMissing), On,

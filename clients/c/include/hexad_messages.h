@@ -77,6 +77,7 @@
 #define HEXAD_DIAGNOSTIC_PAYLOAD_CHANGED 135u
 #define HEXAD_DIAGNOSTIC_IMPACT 136u
 #define HEXAD_DIAGNOSTIC_DISTURBANCE_LASTING 137u
+#define HEXAD_DIAGNOSTIC_DRIVE_BUS_FAILED 138u
 #define HEXAD_DIAGNOSTIC_VELOCITY_ERROR 122u
 #define HEXAD_DIAGNOSTIC_FEEDBACK_SATURATED 123u
 #define HEXAD_LIMIT_BIT_FORCE 0u
@@ -140,7 +141,7 @@ struct hexad_measured {
     uint32_t drive_valid; /* What of the drives is filled in, a sum: 1 `drive_enabled`, 2 `brake_open`, 4 `drive_fault`, 8 `force_n`. */
     uint32_t drive_enabled; /* A bit for each drive that is enabled, the lowest for leg 1. */
     uint32_t brake_open; /* A bit for each brake that is open. */
-    uint32_t drive_fault; /* A bit for each drive with a fault. */
+    uint32_t drive_fault; /* A bit for each drive with a fault. Bit 6: the bus to the drives failed, and the lengths are no measurement. */
     double force_n[6]; /* Forces that act; positive pushes the platform away from the base. [N] */
 };
 static_assert(sizeof(struct hexad_measured) == 296, "size");

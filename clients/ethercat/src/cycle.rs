@@ -8,8 +8,8 @@
 
 use ethercrab::{Command, RegisterAddress, SubDeviceState};
 use hexad_client::messages::{ForceMessage, MeasuredMessage};
+use hexad_core::control::signals::inputs::DriveStatus;
 use hexad_core::model::LEGS;
-use tracing::{info, warn};
 
 use crate::al_state;
 use crate::bus::Bus;
@@ -17,11 +17,11 @@ use crate::cia402::Goal;
 use crate::drives_file::{BusSection, OnBrake};
 use crate::link::Link;
 use crate::permission::Permission;
-use crate::process_data::{Exchange, ProcessData};
+use crate::process_data::{Exchange, ProcessData, StopCause};
 use crate::startup::{FIRST_ADDRESS, OpDevices};
 
 /// Interval at which the driver looks for the forces \[ns\].
-const POLL_NS: u64 = 10_000;
+pub(crate) const POLL_NS: u64 = 10_000;
 /// Time that the second exchange needs before SYNC0, as a share of the period.
 const SECOND_EXCHANGE_SHARE: u64 = 8;
 /// Cycles between attempts to bring a device back to OP, and cycles for which a fault is acknowledged.
@@ -40,7 +40,7 @@ pub trait Daemon {
     fn receive(&mut self, now_ns: u64) -> Option<ForceMessage>;
 }
 
-/// Counts of cycles.
+/// Counts of cycles, and what happened last. Another thread logs it: a log allocates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Periods of SYNC0.
@@ -51,6 +51,10 @@ pub struct Counts {
     pub late: u64,
     /// Failures that stopped all drives.
     pub stops: u64,
+    /// Of the last of these.
+    pub stop_cause: Option<StopCause>,
+    /// Times that faults of drives were acknowledged, because the daemon had none any more.
+    pub acknowledgements: u64,
 }
 
 /// Failure that only a new start of the bus can end.
@@ -70,6 +74,8 @@ pub struct Driver<D> {
     /// Counts since the start.
     pub counts: Counts,
     permission: Permission,
+    /// The bus failed, and the daemon has not responded to it yet.
+    has_bus_failed: bool,
     timing: BusSection,
     missing_cycles: u64,
     resets_until_cycle: u64,
@@ -84,6 +90,7 @@ impl<D: Daemon> Driver<D> {
             data,
             counts: Counts::default(),
             permission: Permission::new(longest_age_ns),
+            has_bus_failed: false,
             timing: timing.clone(),
             missing_cycles: 0,
             resets_until_cycle: 0,
@@ -100,8 +107,10 @@ impl<D: Daemon> Driver<D> {
         self.counts.cycles += 1;
         let exchange = self.data.next_exchange(bus, devices);
         self.supervise(exchange);
-        if exchange == Exchange::Complete {
+        if exchange == Exchange::Complete || self.has_bus_failed {
             self.publish();
+        }
+        if exchange == Exchange::Complete {
             self.wait_for_forces(bus);
         } else {
             self.receive_forces(bus.wire.link.now_ns());
@@ -135,7 +144,7 @@ impl<D: Daemon> Driver<D> {
         self.data.clock.next_sync0_ns() - period_ns / SECOND_EXCHANGE_SHARE
     }
 
-    /// Publishes what the drives latched at the last SYNC0.
+    /// Publishes what the drives latched at the last SYNC0, or that the bus failed.
     fn publish(&mut self) {
         let stamp_ns = self.data.clock.sync0_ns();
         let mut measured = MeasuredMessage { drive_valid: ALL_FIELDS, ..MeasuredMessage::default() };
@@ -147,6 +156,7 @@ impl<D: Daemon> Driver<D> {
             measured.brake_open |= u32::from(drive.is_brake_open(stamp_ns)) << index;
             measured.drive_fault |= u32::from(drive.state().is_fault()) << index;
         }
+        measured.drive_fault |= if self.has_bus_failed { DriveStatus::BUS_FAILED } else { 0 };
         self.daemon.publish(stamp_ns, measured);
     }
 
@@ -170,25 +180,21 @@ impl<D: Daemon> Driver<D> {
     }
 
     fn receive_forces(&mut self, now_ns: u64) {
-        if let Some(message) = self.daemon.receive(now_ns)
-            && self.permission.receive(message)
-        {
-            info!("the daemon has no fault: faults of drives are acknowledged");
+        let Some(message) = self.daemon.receive(now_ns) else { return };
+        self.has_bus_failed &= message.valid == 1;
+        if self.permission.receive(message) {
+            self.counts.acknowledgements += 1;
             self.resets_until_cycle = self.counts.cycles + RECOVERY_CYCLES;
         }
     }
 
     /// Ends the permission at a failure.
     fn supervise(&mut self, exchange: Exchange) {
-        let is_lost = self.data.lost_in_row >= self.timing.lost_frames;
-        if !self.data.has_fault() && !is_lost && exchange != Exchange::Incomplete {
-            return;
-        }
+        let Some(cause) = self.data.stop_cause(exchange) else { return };
+        self.has_bus_failed |= !matches!(cause, StopCause::DriveFault { .. });
         if self.permission.stop() {
             self.counts.stops += 1;
-            let states = self.data.states.map(u8::from);
-            let errors = self.data.drives.map(|drive| drive.inputs().error_code);
-            warn!(?states, ?errors, lost_frames = self.data.lost_in_row, "all drives are stopped");
+            self.counts.stop_cause = Some(cause);
         }
     }
 

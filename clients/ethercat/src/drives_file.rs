@@ -4,6 +4,7 @@ use hexad_core::model::LEGS;
 use serde::Deserialize;
 use toml::{Table, Value};
 
+use crate::identity::IdentityBy;
 use crate::units::LegUnits;
 
 /// Drives of one machine.
@@ -59,10 +60,16 @@ pub struct LegSection {
     pub product: u32,
     /// Serial number of the drive whose encoder the offset belongs to.
     pub serial: u32,
+    /// How another drive in its place is noticed.
+    pub identity: IdentityBy,
     /// Serial number of the drive with which `jog` has found the right direction.
     pub jogged_serial: Option<u32>,
+    /// The same for a drive without a serial number: its position, which proves nothing about a drive that was exchanged.
+    pub jogged_position: Option<usize>,
     /// Of the motor's encoder.
     pub counts_per_rev: f64,
+    /// Bits of its position, single-turn and multi-turn together.
+    pub position_bits: u32,
     /// Revolutions of the motor for one of the screw.
     pub gear: f64,
     /// Travel for one revolution of the screw.
@@ -128,7 +135,9 @@ shift_us = 100
 on_brake = "quick_stop"
 "#;
 /// The same of a leg.
-const LEG_DEFAULTS: &str = "
+const LEG_DEFAULTS: &str = r#"
+identity = "serial"
+position_bits = 32
 gear = 1.0
 efficiency = 1.0
 sdo = []
@@ -136,7 +145,7 @@ brake_hold = []
 max_slip_m = 0.0005
 rx_pdo = 0x1600
 tx_pdo = 0x1a00
-";
+"#;
 
 /// Errors that were found together, a line each.
 #[derive(Debug, thiserror::Error)]
@@ -186,25 +195,22 @@ impl DrivesFile {
         }
     }
 
-    /// Legs whose direction has not been checked with their present drive, in words.
-    pub fn unchecked_directions(&self) -> Vec<String> {
-        let unchecked = (1..).zip(&self.legs).filter(|(_, leg)| leg.jogged_serial != Some(leg.serial));
-        unchecked
-            .map(|(number, leg)| {
-                format!(
-                    "leg {number}: its direction was not checked with the drive of serial number {}: jog",
-                    leg.serial
-                )
-            })
-            .collect()
-    }
-
-    /// Legs whose brake is not tested, in words.
-    pub fn untested_brakes(&self) -> Option<String> {
-        let untested = (1..).zip(&self.legs).filter(|(_, leg)| leg.brake_hold.is_empty());
-        let numbers: Vec<_> = untested.map(|(number, _): (u32, _)| number.to_string()).collect();
-        (!numbers.is_empty())
-            .then(|| format!("the brakes of legs {} are not tested: no brake_hold", numbers.join(", ")))
+    /// What the file leaves to people, in words: drives that nothing identifies, brakes that are not tested.
+    pub fn warnings(&self) -> Vec<String> {
+        let legs = |is_named: fn(&LegSection) -> bool| {
+            let named = (1u32..).zip(&self.legs).filter(|(_, leg)| is_named(leg));
+            let numbers: Vec<_> = named.map(|(number, _)| number.to_string()).collect();
+            (!numbers.is_empty()).then(|| numbers.join(", "))
+        };
+        let unidentified = legs(|leg| leg.identity == IdentityBy::Position).map(|legs| {
+            format!(
+                "the drives of legs {legs} are known by their position alone (identity = \"position\"): exchanged cables or a \
+                 replaced drive are not noticed and the platform moves to wrong poses; after work on them compare each length"
+            )
+        });
+        let untested = legs(|leg| leg.brake_hold.is_empty())
+            .map(|legs| format!("the brakes of legs {legs} are not tested: no brake_hold"));
+        unidentified.into_iter().chain(untested).collect()
     }
 
     /// The same drives, with brakes that stay closed while operation is enabled.
@@ -265,6 +271,7 @@ impl LegSection {
             &[
                 ("position", self.position as f64, 1.0, LEGS as f64),
                 ("counts_per_rev", self.counts_per_rev, 100.0, 1e9),
+                ("position_bits", self.position_bits.into(), 8.0, 32.0),
                 ("gear", self.gear, 0.01, 1000.0),
                 ("lead_m", self.lead_m, 1e-4, 1.0),
                 ("efficiency", self.efficiency, 0.1, 1.0),
@@ -297,6 +304,7 @@ impl LegSection {
     pub fn units(&self) -> LegUnits {
         LegUnits {
             counts_per_rev: self.counts_per_rev,
+            position_bits: self.position_bits,
             gear: self.gear,
             lead_m: self.lead_m,
             efficiency: self.efficiency,

@@ -5,23 +5,13 @@ use hexad_core::model::LEGS;
 use crate::bus::Bus;
 use crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE_BIT;
 use crate::drives_file::{DrivesFile, LegSection};
+use crate::identity::{Identity, ambiguity, in_words};
 use crate::link::Link;
 use crate::objects;
 use crate::startup::PreOpDevices;
 
 /// Rated torques of file and drive may differ by this share: drives round it.
 const RATED_TORQUE_TOLERANCE: f64 = 0.01;
-
-/// Vendor, product and serial number of a device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Identity {
-    /// Number that the EtherCAT Technology Group has assigned.
-    pub vendor: u32,
-    /// Of the vendor.
-    pub product: u32,
-    /// Of the device.
-    pub serial: u32,
-}
 
 /// Vendor, product and serial number of each device.
 pub fn identities<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices) -> Vec<Identity> {
@@ -50,9 +40,8 @@ pub fn contradictions<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, file: &
             errors.push(format!("leg {number}: no device at position {}", leg.position));
             continue;
         };
-        let expected = Identity { vendor: leg.vendor, product: leg.product, serial: leg.serial };
-        if *identity != expected {
-            errors.push(format!("leg {number}: {}", identity_error(expected, *identity, &found)));
+        if *identity != leg.identity() {
+            errors.push(format!("leg {number}: {}", identity_error(leg.identity(), *identity, &found)));
             continue;
         }
         let lacks = drive_errors(bus, devices, leg);
@@ -63,16 +52,18 @@ pub fn contradictions<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, file: &
 
 fn identity_error(expected: Identity, found: Identity, all: &[Identity]) -> String {
     let Identity { vendor, product, serial } = expected;
-    if let Some(position) = all.iter().position(|identity| *identity == expected) {
+    if let Some(position) = all.iter().position(|identity| *identity == expected)
+        && ambiguity(expected, all).is_none()
+    {
         return format!(
             "its drive, serial number {serial}, is at position {}: cables exchanged?",
             position + 1
         );
     }
     if (found.vendor, found.product) == (vendor, product) {
+        let [found, expected] = [found.serial, serial].map(in_words);
         return format!(
-            "drive with serial number {} instead of {serial}: measure its offset again (zero)",
-            found.serial
+            "drive with {found} instead of {expected}: measure its offset again (zero), then jog"
         );
     }
     let found = format!("vendor {:#x}, product {:#x}", found.vendor, found.product);

@@ -27,7 +27,7 @@ impl LegDrive {
             units,
             max_torque_permille: leg.max_torque_permille,
             brake: leg.brake,
-            counter: Counter::near(units.counts(length_m) as i32, units.counts(length_m)),
+            counter: Counter::new(units.counts(length_m), units.position_bits),
             has_position: false,
             rounding: TorqueRounding::default(),
             inputs: Inputs::default(),

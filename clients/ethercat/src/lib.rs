@@ -18,6 +18,7 @@ pub mod cia402;
 pub mod cycle;
 pub mod drives_file;
 pub mod file_edit;
+pub mod identity;
 pub mod inventory;
 pub mod jog;
 pub mod leg_drive;

@@ -32,10 +32,12 @@ pub fn contradictions(file: &DrivesFile, machine: &Config) -> Vec<String> {
                 leg.max_torque_permille, leg.rated_torque_n_m, actuator.max_force
             ));
         }
-        let range_m = leg.units().metres_per_count().abs() * 2f64.powi(32);
-        if range_m <= actuator.max_length - actuator.min_length {
+        let (range_m, stroke_m) = (leg.units().range_m(), actuator.max_length - actuator.min_length);
+        if range_m <= stroke_m + 2.0 * STROKE_TOLERANCE_M {
             errors.push(format!(
-                "leg[{number}]: 32 bits of the encoder are {range_m:.3} m, less than the stroke"
+                "leg[{number}]: position_bits = {}: the range of the encoder is {range_m:.3} m, must exceed the stroke of {stroke_m:.3} m \
+                 by 0.01 m",
+                leg.position_bits
             ));
         }
     }
@@ -53,7 +55,8 @@ pub fn lengths_outside(lengths_m: [Option<f64>; LEGS], machine: &Config) -> Vec<
         let length_m = length_m.filter(|length_m| !(low..=high).contains(length_m))?;
         let (low, high) = (actuator.min_length, actuator.max_length);
         Some(format!(
-            "leg {number}: length {length_m:.4} m is outside of the stroke [{low}, {high}] m: measure its offset again (zero)"
+            "leg {number}: length {length_m:.4} m is outside of the stroke [{low}, {high}] m: measure its offset again (zero), or \
+             correct counts_per_rev or position_bits"
         ))
     });
     found.collect()

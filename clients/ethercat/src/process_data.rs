@@ -30,6 +30,38 @@ pub enum Exchange {
     Lost,
 }
 
+/// Why all drives have to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StopCause {
+    /// Frames that did not come back, in a row.
+    #[error(
+        "{0} frames in a row are lost or late: look at the cable to the first drive, and at the load of this computer (lost_frames)"
+    )]
+    LostFrames(u32),
+    /// Drives did not take part in an exchange.
+    #[error(
+        "working counter {found}, must be {WORKING_COUNTER}: a drive is missing; states by position {states:?}, 8 is OP: look at \
+         cable and power of the first one with another"
+    )]
+    WorkingCounter {
+        /// Of the frame that came back.
+        found: u16,
+        /// AL states in the order of the bus, 0 of a device that is missing.
+        states: [u8; LEGS],
+    },
+    /// All took part, and not all are in OP.
+    #[error("a drive has left OP: states by position {0:?}, must be 8")]
+    LeftOp([u8; LEGS]),
+    /// A drive has a fault.
+    #[error("leg {leg} has the fault {code:#06x}: reset it")]
+    DriveFault {
+        /// From 1.
+        leg: usize,
+        /// 0x603f
+        code: u16,
+    },
+}
+
 /// Process data of six drives, and the grid of their SYNC0.
 #[derive(Clone, Copy, Debug)]
 pub struct ProcessData {
@@ -43,6 +75,8 @@ pub struct ProcessData {
     pub clock: SyncClock,
     /// States of the devices in the order of the bus; none of a device that is missing.
     pub states: [SubDeviceState; LEGS],
+    /// Working counter of the last frame that came back.
+    pub working_counter: u16,
     /// Exchanges without a response, in a row and since the start.
     pub lost_in_row: u32,
     /// The same since the start.
@@ -62,6 +96,7 @@ impl ProcessData {
             sent: [Outputs::default(); LEGS],
             clock,
             states: [SubDeviceState::Op; LEGS],
+            working_counter: 0,
             lost_in_row: 0,
             lost_frames: 0,
             max_lost_frames: file.bus.lost_frames,
@@ -83,19 +118,28 @@ impl ProcessData {
 
     /// The next exchange, and whether its frame has come back. Errors are in words: a drive is missing or has a fault.
     pub fn next_inputs<L: Link>(&mut self, bus: &mut Bus<L>, devices: &OpDevices) -> Result<bool, String> {
-        match self.next_exchange(bus, devices) {
-            Exchange::Complete | Exchange::Early => {}
-            Exchange::Incomplete => return Err("a drive is missing or has left OP".into()),
-            Exchange::Lost if self.lost_in_row >= self.max_lost_frames => {
-                return Err("frames do not come back".into());
-            }
-            Exchange::Lost => return Ok(false),
+        let exchange = self.next_exchange(bus, devices);
+        match self.stop_cause(exchange) {
+            Some(cause) => Err(cause.to_string()),
+            None => Ok(exchange != Exchange::Lost),
         }
-        match (1..=LEGS).zip(&self.drives).find(|(_, drive)| drive.state().is_fault()) {
-            Some((leg, drive)) => {
-                Err(format!("leg {leg} has the fault {:#06x}: reset it", drive.inputs().error_code))
+    }
+
+    /// Why all drives have to stop after an exchange, if they have to.
+    pub fn stop_cause(&self, exchange: Exchange) -> Option<StopCause> {
+        let states = self.states.map(u8::from);
+        match exchange {
+            Exchange::Incomplete if self.working_counter != WORKING_COUNTER => {
+                Some(StopCause::WorkingCounter { found: self.working_counter, states })
             }
-            None => Ok(true),
+            Exchange::Incomplete => Some(StopCause::LeftOp(states)),
+            Exchange::Lost if self.lost_in_row >= self.max_lost_frames => {
+                Some(StopCause::LostFrames(self.lost_in_row))
+            }
+            _ => (1..)
+                .zip(&self.drives)
+                .find(|(_, drive)| drive.state().is_fault())
+                .map(|(leg, drive)| StopCause::DriveFault { leg, code: drive.inputs().error_code }),
         }
     }
 
@@ -137,6 +181,7 @@ impl ProcessData {
         for (state, found) in self.states.iter_mut().zip(&response.subdevice_states) {
             *state = *found;
         }
+        self.working_counter = response.working_counter;
         if response.working_counter != WORKING_COUNTER {
             return Exchange::Incomplete;
         }
@@ -151,10 +196,5 @@ impl ProcessData {
             true if since_sync0_ns < self.shift_ns / 2 => Exchange::Early,
             true => Exchange::Complete,
         }
-    }
-
-    /// Whether a drive has a fault.
-    pub fn has_fault(&self) -> bool {
-        self.drives.iter().any(|drive| drive.state().is_fault())
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::bus::Bus;
+use crate::identity::ambiguity;
 use crate::inventory::identities;
 use crate::link::Link;
 use crate::objects;
@@ -16,9 +17,10 @@ pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str
          # lead_m = ?        # travel for one revolution of the screw\n# sign = ?          # 1 or -1, see jog\n\
          # offset_m = ?      # length at count 0, see zero\n\
          # brake = ?         # {{ status_bit = 12 }}, {{ input_bit = 16 }} or {{ open_ms = 200 }}\n\
-         gear = 1.0\nefficiency = 1.0\n"
+         position_bits = 32  # of the encoder: single-turn + multi-turn\ngear = 1.0\nefficiency = 1.0\n"
     );
-    for (position, identity) in identities(bus, devices).into_iter().enumerate() {
+    let all = identities(bus, devices);
+    for (position, identity) in all.iter().enumerate() {
         let mut objects = bus.objects(devices, position);
         let mut read = |index, sub| objects.value(index, sub).ok().map(|value| value as f64);
         let rated_n_m = read(objects::RATED_TORQUE, 0).map(|value| value * 1e-3);
@@ -34,6 +36,9 @@ pub fn drives_file<L: Link>(bus: &mut Bus<L>, devices: &PreOpDevices, name: &str
             identity.product,
             identity.serial
         );
+        if let Some(why) = ambiguity(*identity, &all) {
+            let _ = writeln!(text, "# {why}");
+        }
         for (key, value) in [
             ("counts_per_rev", increments.map(|increments| format!("{:?}", increments / revolutions))),
             ("rated_torque_n_m", rated_n_m.map(|value| format!("{value:?}"))),

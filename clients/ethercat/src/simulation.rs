@@ -4,7 +4,7 @@ use hexad_core::model::LEGS;
 use hexad_machine::config::Config;
 
 use crate::drives_file::DrivesFile;
-use crate::inventory::Identity;
+use crate::identity::Identity;
 use crate::segment::Segment;
 use crate::segment::device::DeviceModel;
 use crate::segment::mechanics::Mechanics;

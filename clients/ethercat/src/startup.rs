@@ -70,7 +70,7 @@ pub fn bring_up<L: Link>(
     mut devices: PreOpDevices,
     file: &DrivesFile,
 ) -> Result<(OpDevices, SyncClock), ErrorList> {
-    let mut errors = vec![];
+    let mut errors = file.unidentified();
     for (number, leg) in (1..).zip(&file.legs) {
         if let Err(error) = configure(bus, &devices, leg, &file.bus) {
             errors.push(format!("leg {number}: {error}"));

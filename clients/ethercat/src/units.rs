@@ -7,6 +7,8 @@ use std::f64::consts::TAU;
 pub struct LegUnits {
     /// Of the motor.
     pub counts_per_rev: f64,
+    /// Of the position that the encoder counts, single-turn and multi-turn together: it wraps at this range.
+    pub position_bits: u32,
     /// Revolutions of the motor for one of the screw.
     pub gear: f64,
     /// Travel for one revolution of the screw \[m\].
@@ -27,6 +29,11 @@ impl LegUnits {
         self.sign * self.lead_m / (self.counts_per_rev * self.gear)
     }
 
+    /// Travel in which each length has a reading of its own \[m\].
+    pub fn range_m(&self) -> f64 {
+        self.metres_per_count().abs() * 2f64.powi(self.position_bits as i32)
+    }
+
     /// Force for a thousandth of the rated torque \[N\], with its sign.
     pub fn newtons_per_permille(&self) -> f64 {
         self.sign * 1e-3 * self.rated_torque_n_m * TAU * self.gear * self.efficiency / self.lead_m
@@ -43,24 +50,30 @@ impl LegUnits {
     }
 }
 
-/// Counts of an encoder of 32 bits, continued across its ends.
+/// Counts of an encoder, continued across the ends of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Counter(i64);
+pub struct Counter {
+    counts: i64,
+    bits: u32,
+}
 
 impl Counter {
-    /// The count that agrees with a reading and is nearest to `expected`.
-    pub fn near(reading: i32, expected: i64) -> Self {
-        Self(expected).continued(reading)
+    /// A counter at a count, of an encoder of 1 to 32 bits.
+    pub fn new(counts: i64, bits: u32) -> Self {
+        Self { counts, bits }
     }
 
-    /// The count after another reading, at most half the range away.
+    /// The count that agrees with a reading and is at most half the range away. Bits of the reading beyond those of the encoder
+    /// have no meaning: some drives extend the sign into them, others zeros.
     pub fn continued(self, reading: i32) -> Self {
-        Self(self.0 + i64::from(reading.wrapping_sub(self.0 as i32)))
+        let unused = i64::BITS - self.bits;
+        let change = i64::from(reading).wrapping_sub(self.counts) << unused >> unused;
+        Self { counts: self.counts + change, ..self }
     }
 
     /// The count.
     pub fn counts(self) -> i64 {
-        self.0
+        self.counts
     }
 }
 
@@ -88,6 +101,7 @@ mod tests {
 
     const LEG: LegUnits = LegUnits {
         counts_per_rev: 1_048_576.0,
+        position_bits: 32,
         gear: 2.0,
         lead_m: 0.02,
         efficiency: 0.9,
@@ -107,13 +121,27 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_continues_across_its_ends() {
-        let mut counter = Counter::near(i32::MIN + 3, i64::from(i32::MAX));
-        assert_eq!(counter.counts(), i64::from(i32::MAX) + 4);
-        for reading in [i32::MIN + 1, i32::MAX, i32::MAX - 5, i32::MIN] {
-            counter = counter.continued(reading);
-            assert_eq!(counter.counts() as i32, reading);
-            assert!((counter.counts() - i64::from(i32::MAX)).abs() < 10, "{counter:?}");
+    fn a_counter_follows_every_motion_of_less_than_half_its_range() {
+        let mut state = 1u64;
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state >> 16
+        };
+        for _ in 0..10_000 {
+            let bits = 8 + (random() % 25) as u32;
+            let (range, mut counts) = (1i64 << bits, random() as i64 - (1 << 47));
+            let mut counter = Counter::new(counts, bits);
+            for _ in 0..20 {
+                counts += (random() as i64).rem_euclid(range) - range / 2;
+                let zero_extended = counts.rem_euclid(range);
+                let sign_extended =
+                    if zero_extended >= range / 2 { zero_extended - range } else { zero_extended };
+                let other_bits = counts;
+                for reading in [zero_extended, sign_extended, other_bits] {
+                    assert_eq!(counter.continued(reading as i32).counts(), counts, "{bits} bits, {reading}");
+                }
+                counter = counter.continued(zero_extended as i32);
+            }
         }
     }
 

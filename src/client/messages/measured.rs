@@ -31,7 +31,7 @@ message! {
         drive_enabled: u32,
         /// A bit for each brake that is open.
         brake_open: u32,
-        /// A bit for each drive with a fault.
+        /// A bit for each drive with a fault. Bit 6: the bus to the drives failed, and the lengths are no measurement.
         drive_fault: u32,
         /// Forces that act; positive pushes the platform away from the base.
         force_n: [f64; 6] ["N"],

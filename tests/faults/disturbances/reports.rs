@@ -22,6 +22,13 @@ pub fn drive_fault(m: &mut Moment) {
     m.measured().drives = DriveStatus { fault: Some(1 << LEG), ..DriveStatus::default() };
 }
 
+/// The lengths beside the report are none.
+pub fn bus_failed(m: &mut Moment) {
+    let measured = m.measured();
+    measured.length = [0.0; LEGS];
+    measured.drives = DriveStatus { fault: Some(DriveStatus::BUS_FAILED), ..DriveStatus::default() };
+}
+
 pub fn half_of_a_force(m: &mut Moment) {
     let mut force = m.world.rig.force.unwrap_or_default();
     force[LEG] *= 0.5;

@@ -11,14 +11,14 @@ use hexad_ethercat::process_data::{Exchange, ProcessData};
 use hexad_ethercat::raw_socket::RawSocket;
 use hexad_ethercat::startup::{self, OpDevices, PreOpDevices};
 use hexad_ethercat::{
-    brake_test, file_edit, inventory, jog as jogging, machine_check, objects, scan as scanning,
+    brake_test, file_edit, identity, inventory, jog as jogging, machine_check, objects, scan as scanning,
 };
 use hexad_machine::config::Config;
 use hexad_machine::text::files::print;
 
-use tracing::warn;
-
-use super::{Failure, after_start, before_start, load_drives, load_machine, load_text, none_of, open};
+use super::{
+    Failure, after_start, before_start, load_and_warn, load_drives, load_machine, load_text, none_of, open,
+};
 
 /// Prints a line. A pipe that is closed must end no command while drives are enabled.
 macro_rules! say {
@@ -51,7 +51,7 @@ pub fn check(drives: &Path, machine: Option<&Path>, is_offline: bool) -> Result<
     }
     none_of(errors)?;
     say!("{}: no error", drives.display());
-    file.untested_brakes().into_iter().for_each(|text| say!("{text}"));
+    file.warnings().into_iter().for_each(|text| say!("{text}"));
     Ok(())
 }
 
@@ -84,7 +84,6 @@ pub(super) fn test_brakes(
     machine: &Config,
     stop: &Stop,
 ) -> Result<Result<(), String>, Failure> {
-    file.untested_brakes().into_iter().for_each(|text| warn!("{text}"));
     if file.legs.iter().all(|leg| leg.brake_hold.is_empty()) {
         return Ok(Ok(()));
     }
@@ -98,7 +97,7 @@ pub(super) fn test_brakes(
 }
 
 pub fn brakes(drives: &Path, machine: &Path) -> Result<(), Failure> {
-    let (file, machine) = (load_drives(drives)?, load_machine(machine)?);
+    let (file, machine) = (load_and_warn(drives)?, load_machine(machine)?);
     none_of([file.unchecked_directions(), machine_check::contradictions(&file, &machine)].concat())?;
     let stop = Stop::on_signals().map_err(before_start)?;
     test_brakes(&file, &machine, &stop)?.map_err(after_start)?;
@@ -107,7 +106,7 @@ pub fn brakes(drives: &Path, machine: &Path) -> Result<(), Failure> {
 }
 
 pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: bool) -> Result<(), Failure> {
-    let file = load_drives(drives)?;
+    let file = load_and_warn(drives)?;
     let section = leg_section(&file, leg)?;
     if !is_unloaded {
         return Err(before_start(
@@ -136,7 +135,7 @@ pub fn jog(drives: &Path, leg: usize, permille: i16, seconds: f64, is_unloaded: 
     }
     let (way_mm, word) = (way_m * 1e3, if way_m > 0.0 { "longer" } else { "shorter" });
     say!("leg {leg}: by its encoder it is {:.3} mm {word}; look whether it is", way_mm.abs());
-    edit(drives, leg, &[("jogged_serial", is_direction_right.then(|| section.serial.to_string()))])?;
+    edit(drives, leg, &section.direction_record(is_direction_right))?;
     if is_direction_right {
         say!("leg {leg}: if it is not, `sign` is wrong");
         return Ok(());
@@ -161,18 +160,23 @@ pub(super) fn leave(mut bus: Bus<RawSocket>, devices: OpDevices) {
 }
 
 pub fn zero(drives: &Path, leg: usize, length_m: f64) -> Result<(), Failure> {
-    let file = load_drives(drives)?;
+    let file = load_and_warn(drives)?;
     let section = leg_section(&file, leg)?;
     let frames = Frames::new();
     let (mut bus, devices) = pre_op(&frames, &file)?;
     let position = section.position - 1;
     let found = inventory::identities(&mut bus, &devices);
     let identity = found.get(position).ok_or_else(|| before_start(format!("leg {leg}: no device")))?;
+    if let Some(why) = identity::ambiguity(*identity, &found)
+        && section.identity == identity::IdentityBy::Serial
+    {
+        return Err(before_start(format!("leg {leg}: {why}")));
+    }
     let counts = bus.objects(&devices, position).value(objects::POSITION, 0).map_err(after_start)?;
     let offset_m = length_m - counts as f64 * section.units().metres_per_count();
     let values = [("serial", Some(identity.serial.to_string())), ("offset_m", Some(format!("{offset_m:?}")))];
     edit(drives, leg, &values)?;
-    say!("leg {leg}: offset_m = {offset_m:?} with the drive of serial number {}", identity.serial);
+    say!("leg {leg}: offset_m = {offset_m:?} with the drive of {}", identity::in_words(identity.serial));
     Ok(())
 }
 
@@ -185,8 +189,9 @@ pub fn reset(drives: &Path) -> Result<(), Failure> {
         for (drive, outputs) in data.drives.iter_mut().zip(&mut data.outputs) {
             *outputs = drive.command(goal, 0.0);
         }
-        if data.next_exchange(&mut bus, &devices) == Exchange::Incomplete {
-            return Err(after_start("a drive is missing or has left OP"));
+        let exchange = data.next_exchange(&mut bus, &devices);
+        if let Some(cause) = data.stop_cause(exchange).filter(|_| exchange == Exchange::Incomplete) {
+            return Err(after_start(cause));
         }
     }
     leave(bus, devices);

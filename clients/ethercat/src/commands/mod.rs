@@ -13,6 +13,7 @@ use hexad_ethercat::bus::{Bus, Frames};
 use hexad_ethercat::drives_file::DrivesFile;
 use hexad_ethercat::raw_socket::RawSocket;
 use hexad_machine::config::Config;
+use tracing::warn;
 
 /// Driver of hexad for CiA 402 drives on EtherCAT. No version of it has run on hardware yet: read docs/ethercat.md first.
 #[derive(Debug, Parser)]
@@ -176,6 +177,13 @@ fn load_text(path: &Path) -> Result<String, Failure> {
 
 fn load_drives(path: &Path) -> Result<DrivesFile, Failure> {
     DrivesFile::parse(&load_text(path)?, &path.display().to_string()).map_err(before_start)
+}
+
+/// Drives that move, with a warning of what the file leaves to people.
+fn load_and_warn(path: &Path) -> Result<DrivesFile, Failure> {
+    let file = load_drives(path)?;
+    file.warnings().iter().for_each(|text| warn!("{text}"));
+    Ok(file)
 }
 
 fn load_machine(path: &Path) -> Result<Config, Failure> {

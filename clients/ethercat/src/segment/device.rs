@@ -7,7 +7,7 @@ use super::object_dictionary::{MappedObject, ObjectDictionary};
 use super::servo_drive::{DriveCommand, ServoDrive};
 use super::sii;
 use crate::al_state::{INIT, OP, SAFE_OP};
-use crate::inventory::Identity;
+use crate::identity::Identity;
 use crate::objects;
 use crate::units::LegUnits;
 
@@ -289,7 +289,8 @@ impl Device {
     fn latch_inputs(&mut self, length_m: f64) {
         let drive = &self.drive;
         let counts = self.model.units.counts(length_m);
-        let position = if self.is_encoder_reversed { -counts } else { counts } as i32;
+        let range = 1 << self.model.units.position_bits;
+        let position = if self.is_encoder_reversed { -counts } else { counts }.rem_euclid(range);
         for (index, value) in [
             (objects::STATUS_WORD, u64::from(drive.status_word())),
             (objects::POSITION, u64::from(position as u32)),

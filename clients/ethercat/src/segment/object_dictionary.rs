@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::device::DeviceModel;
 use crate::cia402::CYCLIC_SYNCHRONOUS_TORQUE_BIT;
-use crate::inventory::Identity;
+use crate::identity::Identity;
 use crate::objects;
 
 /// Name that object 0x1008 shows.

@@ -1,6 +1,6 @@
 //! Content of a simulated device's EEPROM: the subdevice information interface (SII), ETG1000.6 chapter 5.4.
 
-use crate::inventory::Identity;
+use crate::identity::Identity;
 
 /// Receive mailbox, send mailbox, outputs, inputs: start address of each sync manager.
 pub const SYNC_MANAGER_STARTS: [u16; 4] = [0x1000, 0x1080, 0x1100, 0x1400];

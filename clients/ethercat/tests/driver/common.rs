@@ -26,6 +26,23 @@ pub fn machine() -> Config {
     Config::parse(&text, "motion_base").unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// The same drives without serial numbers, as most are delivered.
+pub fn without_serials() -> String {
+    (101..=106)
+        .fold(DRIVES.to_string(), |text, serial| text.replace(&format!("serial = {serial}"), "serial = 0"))
+}
+
+/// The same, known by their position alone, where each was jogged.
+pub fn by_position() -> String {
+    let mut positions = 1..;
+    let legs = without_serials().replace("[drive]", "[drive]\nidentity = \"position\"");
+    let parts: Vec<_> = legs.split("jogged_serial = 0").map(String::from).collect();
+    parts
+        .into_iter()
+        .reduce(|text, part| format!("{text}jogged_position = {}{part}", positions.next().unwrap()))
+        .unwrap()
+}
+
 pub fn segment() -> Segment {
     simulation::segment(&drives(), &machine(), START_NS)
 }

@@ -1,5 +1,6 @@
 //! Table of failures during motion: what becomes of the drives, and how far the platform still moves.
 
+use hexad_client::realtime::allocation::calls_of_this_thread;
 use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::inputs::Measurement;
 use hexad_core::control::signals::state::{Request, State};
@@ -10,6 +11,7 @@ use hexad_ethercat::bus::Frames;
 use hexad_ethercat::cia402::DriveState;
 use hexad_ethercat::cycle::DevicesLost;
 use hexad_ethercat::link::Link;
+use hexad_ethercat::process_data::StopCause;
 use hexad_ethercat::segment::Segment;
 use hexad_ethercat::segment::device::DeviceModel;
 
@@ -29,15 +31,25 @@ fn way_mm(rig: &mut Rig, mut pass: impl FnMut(&mut Rig)) -> f64 {
     let before = rig.simulator().state().pose.position;
     let speed = rig.simulator().state().twist.linear.norm();
     assert!(SPEED_M_S.contains(&speed), "{speed} m/s");
-    let mut way = 0.0f64;
+    let (mut way, calls) = (0.0f64, calls_of_this_thread());
     for _ in 0..150 {
         pass(rig);
         way = way.max((rig.simulator().state().pose.position - before).norm() * 1e3);
     }
+    assert_eq!(calls_of_this_thread() - calls, 0, "no cycle allocates");
     let rest = rig.simulator().state().twist.linear.norm();
     assert_eq!(rest, 0.0, "the platform rests");
     println!("{way:.2} mm at {speed:.2} m/s");
     way
+}
+
+/// The driver has stopped the drives for a cause in these words, and to the daemon the bus is the first cause.
+fn names_the_bus(rig: &Rig, words: &str) {
+    let cause = rig.driver.counts.stop_cause.map(|cause: StopCause| cause.to_string()).unwrap_or_default();
+    assert!(cause.starts_with(words), "{words:?} is not in {cause:?}");
+    let output = rig.driver.daemon.output;
+    assert_eq!((output.state, output.diagnostic.code), (State::Fault, DiagnosticCode::DriveBusFailed));
+    assert_eq!(rig.driver.counts.stops, 1);
 }
 
 /// A rig where the platform moves fast.
@@ -152,6 +164,23 @@ fn a_cut_before_any_device_stops_all() {
             let status = if position < reachable { OP } else { SAFE_OP | ERROR };
             assert_eq!(device.al_status(), status, "cut before {reachable}, device {position}");
         }
+        match reachable {
+            0 => names_the_bus(
+                &rig,
+                "3 frames in a row are lost or late: look at the cable to the first drive",
+            ),
+            _ => {
+                let states: Vec<_> =
+                    (0..LEGS).map(|position| if position < reachable { 8 } else { 0 }).collect();
+                let found = 3 * reachable;
+                names_the_bus(
+                    &rig,
+                    &format!(
+                        "working counter {found}, must be 18: a drive is missing; states by position {states:?}"
+                    ),
+                );
+            }
+        }
         let lost = (0..200).find_map(|_| rig.cycle().err());
         assert_eq!(lost, Some(DevicesLost { reachable }));
     }
@@ -206,6 +235,7 @@ fn frames_lost_in_a_row_stop_all_and_the_bus_recovers() {
     let way = way_mm(&mut rig, |rig| rig.cycles(1));
     assert!(way < MAX_WAY_MM, "{way} mm");
     rig.cycles(200);
+    names_the_bus(&rig, "3 frames in a row are lost");
     for device in &rig.segment().devices {
         assert_eq!((device.al_status(), device.drive.state), (OP, DriveState::Fault));
     }
@@ -218,6 +248,30 @@ fn frames_lost_in_a_row_stop_all_and_the_bus_recovers() {
     rig.driver.daemon.hold(task_coordinates(&pose, &machine().machine.home));
     rig.engage();
     assert_eq!(rig.drive_states(), [DriveState::OperationEnabled; LEGS]);
+}
+
+/// The frames are back before the daemon could miss a measurement: the drives stop all the same, which would look like an impact.
+#[test]
+fn a_short_failure_of_the_bus_is_the_first_cause() {
+    for (reachable, lost_us, words) in
+        [(2, 0, "working counter 6, must be 18"), (LEGS, 3500, "3 frames in a row are lost")]
+    {
+        let frames = Frames::new();
+        let mut rig = moving(&frames);
+        rig.segment().reachable = reachable;
+        lose_for(&mut rig, lost_us * 1000);
+        let mut cycles = 0;
+        way_mm(&mut rig, |rig| {
+            rig.cycles(1);
+            cycles += 1;
+            if cycles == 1 {
+                rig.segment().reachable = LEGS;
+            }
+        });
+        names_the_bus(&rig, words);
+        assert!(rig.driver.daemon.output.platform.is_some(), "the lengths are back");
+        assert_eq!(rig.driver.daemon.measured.drive_fault, 0);
+    }
 }
 
 #[test]
@@ -264,20 +318,22 @@ fn a_daemon_that_stalls_for_a_moment_changes_nothing() {
 
 #[test]
 fn an_encoder_may_wrap_in_the_middle_of_the_stroke() {
-    let file = drives();
     let home_m = hexad_core::model::inverse_geometry::leg_lengths(
         &machine().machine,
         &hexad_core::model::task::TaskState::at_rest(machine().machine.home).motion().pose,
     )[0];
-    let range_m = file.legs[0].units().metres_per_count() * 2f64.powi(31);
-    let text = DRIVES.replace("offset_m = 1.2", &format!("offset_m = {}", home_m + 0.001 - range_m));
-    let file = hexad_ethercat::drives_file::DrivesFile::parse(&text, "wrapping").unwrap();
-    let frames = Frames::new();
-    let segment = hexad_ethercat::simulation::segment(&file, &machine(), START_NS);
-    let mut rig = Rig::new(&frames, &file, segment);
-    rig.engage_and_move();
-    rig.cycles(8000);
-    assert_eq!(rig.state(), State::Active, "{:?}", rig.driver.daemon.output.diagnostic);
+    // 17 bits single-turn and 12 bits multi-turn, zero-extended to the 32 bits of the object.
+    let of_29_bits = DRIVES.replace("= 1048576", "= 131072\nposition_bits = 29");
+    for (text, half_range_m) in [(DRIVES, 40.96), (&of_29_bits, 40.96), (&of_29_bits, 81.92)] {
+        let text = text.replace("offset_m = 1.2", &format!("offset_m = {}", home_m + 0.001 - half_range_m));
+        let file = hexad_ethercat::drives_file::DrivesFile::parse(&text, "wrapping").unwrap();
+        let frames = Frames::new();
+        let segment = hexad_ethercat::simulation::segment(&file, &machine(), START_NS);
+        let mut rig = Rig::new(&frames, &file, segment);
+        rig.engage_and_move();
+        rig.cycles(8000);
+        assert_eq!(rig.state(), State::Active, "{:?}", rig.driver.daemon.output.diagnostic);
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::common::*;
 fn all_errors_of_a_file_are_reported_at_once() {
     let text = DRIVES
         .replace("interface = \"ec0\"", "interface = \"ec0\"\nperiod_us = 20\nanswer_us = 5000")
-        .replace("sign = -1", "sign = 2\nlead_m = 7.0")
+        .replace("sign = -1", "sign = 2\nlead_m = 7.0\nposition_bits = 33")
         .replace("\nserial = 104", "\nserial = \"x\"")
         .replace("\nserial = 105", "\nserial = 105\nposition = 1")
         .replace("\nserial = 106", "\nserial = 106\ncolour = 1");
@@ -20,6 +20,7 @@ fn all_errors_of_a_file_are_reported_at_once() {
         "my.toml: period_us = 20: must be in [250, 10000]",
         "my.toml: answer_us = 5000: must be in [50, 10]",
         "my.toml: leg[3].lead_m = 7: must be in [0.0001, 1]",
+        "my.toml: leg[3].position_bits = 33: must be in [8, 32]",
         "my.toml: leg[3].sign = 2: must be 1 or -1",
         "my.toml: leg[4].invalid type: string \"x\", expected u32",
         "my.toml: leg[6].unknown field `colour`",
@@ -96,6 +97,11 @@ fn a_machine_file_that_disagrees_is_refused() {
         let errors = machine_check::contradictions(&drives(), &machine).join("\n");
         assert!(errors.contains(expected), "{expected:?} is not in\n{errors}");
     }
+    // 60 revolutions are exactly the stroke of 1.2 m; the tolerance at its ends needs more.
+    let short = DRIVES.replace("counts_per_rev = 1048576", "position_bits = 17\ncounts_per_rev = 2184.53333");
+    let errors = machine_check::contradictions(&DrivesFile::parse(&short, "f").unwrap(), &machine());
+    let expected = "leg[1]: position_bits = 17: the range of the encoder is 1.200 m, must exceed the stroke of 1.200 m by 0.01 m";
+    assert_eq!((errors.len(), errors[0].as_str()), (6, expected));
     let lengths = [1.7, 1.09, 2.306, 2.0, 1.2, 1.8].map(Some);
     let errors = machine_check::lengths_outside(lengths, &machine());
     assert_eq!(errors.len(), 2, "{errors:?}");

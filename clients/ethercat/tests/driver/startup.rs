@@ -2,7 +2,10 @@
 
 use hexad_ethercat::al_state::{OP, PRE_OP, SAFE_OP};
 use hexad_ethercat::bus::Frames;
+use hexad_ethercat::drives_file::DrivesFile;
+use hexad_ethercat::identity::Identity;
 use hexad_ethercat::segment::Segment;
+use hexad_ethercat::segment::device::{Device, DeviceModel};
 use hexad_ethercat::segment::mechanics::Mechanics;
 use hexad_ethercat::simulation;
 
@@ -14,7 +17,7 @@ fn errors(edit: impl FnOnce(&mut Segment), file: &str) -> String {
     let mut segment = segment();
     edit(&mut segment);
     let mut bus = bus(&frames, segment);
-    let file = hexad_ethercat::drives_file::DrivesFile::parse(file, "test").unwrap();
+    let file = DrivesFile::parse(file, "test").unwrap();
     up(&mut bus, &file).map(|_| ()).map_or_else(|errors| errors.to_string(), |()| String::new())
 }
 
@@ -45,6 +48,80 @@ fn the_drives_agree_about_sync0() {
 
 type Row = (&'static str, fn(&mut Segment), &'static str, &'static str, &'static [&'static str]);
 
+fn set_serial(segment: &mut Segment, position: usize, serial: u32) {
+    let device = &mut segment.devices[position];
+    let identity = Identity { serial, ..device.model.identity };
+    *device = Device::new(DeviceModel { identity, ..device.model }, 0);
+}
+
+fn exchange_drives_without_serials(segment: &mut Segment) {
+    (0..6).for_each(|position| set_serial(segment, position, 0));
+    segment.devices.swap(0, 1);
+    segment.leg_of_device.swap(0, 1);
+}
+
+/// Drives 1 and 2 exchange their cables: motor and encoder together, so that no reading shows it.
+#[test]
+fn drives_without_a_serial_number_reach_op_only_where_the_file_accepts_it() {
+    let file = without_serials();
+    let found = errors(exchange_drives_without_serials, &file);
+    for leg in 1..=6 {
+        let words =
+            format!("leg {leg}: its drive has no serial number (0): exchanged cables or a replaced drive");
+        assert!(found.contains(&words) && found.contains("identity = \"position\""), "{words:?}: {found}");
+    }
+    let parsed = |text: &str| DrivesFile::parse(text, "test").unwrap();
+    assert_eq!(
+        parsed(&file).unchecked_directions(),
+        parsed(&file).unidentified(),
+        "jogged_serial = 0 is none"
+    );
+    // Accepted: they start, and each start warns.
+    assert_eq!(errors(exchange_drives_without_serials, &by_position()), "");
+    let accepted = parsed(&by_position());
+    assert_eq!(accepted.unchecked_directions(), [""; 0]);
+    let warning = &accepted.warnings()[0];
+    assert!(warning.contains("legs 1, 2, 3, 4, 5, 6 are known by their position alone"), "{warning}");
+    assert!(warning.contains("exchanged cables or a replaced drive are not noticed"), "{warning}");
+    // The direction has to be jogged all the same, at this position.
+    for record in ["", "jogged_serial = 0", "jogged_position = 3"] {
+        let found = parsed(&by_position().replace("jogged_position = 2", record)).unchecked_directions();
+        assert_eq!(
+            found,
+            ["leg 2: its direction was not checked with the drive at position 2: jog"],
+            "{record}"
+        );
+    }
+    // A drive of another product, or with a number, is refused all the same.
+    let numbered = errors(
+        |segment| {
+            exchange_drives_without_serials(segment);
+            set_serial(segment, 3, 7)
+        },
+        &by_position(),
+    );
+    assert!(
+        numbered.contains("leg 4: drive with serial number 7 instead of no serial number (0)"),
+        "{numbered}"
+    );
+    let unneeded = parsed(&DRIVES.replace("[drive]", "[drive]\nidentity = \"position\"")).unidentified();
+    assert_eq!(unneeded[5], "leg 6: serial = 106 identifies its drive: remove identity = \"position\"");
+}
+
+#[test]
+fn a_scan_of_drives_without_serial_numbers_names_the_remedies_and_takes_none() {
+    let frames = Frames::new();
+    let mut bus = bus(
+        &frames,
+        simulation::segment(&DrivesFile::parse(&without_serials(), "test").unwrap(), &machine(), START_NS),
+    );
+    let devices = hexad_ethercat::startup::find(&mut bus).unwrap();
+    let scanned = hexad_ethercat::scan::drives_file(&mut bus, &devices, "motion_base", "ec0");
+    let comment = "# its drive has no serial number (0): exchanged cables or a replaced drive would not be noticed; give it a number";
+    assert_eq!(scanned.matches(comment).count(), 6, "{scanned}");
+    assert!(!scanned.lines().any(|line| line.starts_with("identity")), "{scanned}");
+}
+
 /// Situation, edits of segment and file, and the words that each error contains.
 const ROWS: &[Row] = &[
     ("no devices", |s| s.reachable = 0, "", "", &["no device answers: look at cable and power"]),
@@ -70,7 +147,33 @@ const ROWS: &[Row] = &[
         |_| {},
         "\nserial = 105",
         "\nserial = 205",
-        &["leg 5: drive with serial number 105 instead of 205: measure its offset again"],
+        &[
+            "leg 5: drive with serial number 105 instead of serial number 205: measure its offset again (zero), then jog",
+        ],
+    ),
+    (
+        "a number in the file, none in the drive",
+        |s| set_serial(s, 4, 0),
+        "",
+        "",
+        &["leg 5: drive with no serial number (0) instead of serial number 105: measure"],
+    ),
+    (
+        "a number in the drive, none in the file",
+        |_| {},
+        "\nserial = 105",
+        "\nserial = 0",
+        &["leg 5: drive with serial number 105 instead of no serial number (0): measure"],
+    ),
+    (
+        "one number in two drives",
+        |s| set_serial(s, 4, 104),
+        "\nserial = 105",
+        "\nserial = 104",
+        &[
+            "leg 4: its drive has serial number 104, as 2 drives have: exchanged cables",
+            "leg 5: its drive has",
+        ],
     ),
     (
         "another product",

@@ -87,7 +87,7 @@ fn the_daemon_drives_the_platform_over_the_bus() {
             let run = network.log("run");
             // No cable loses frames here: it is the host that delays them.
             let gap = watchdog.largest();
-            let is_host = run.contains("lost_frames=3") || gap > Duration::from_millis(1);
+            let is_host = run.contains("in a row are lost") || gap > Duration::from_millis(1);
             assert!(is_host, "{gap:?}\n{}", network.ends());
             return not_run::not_run(
                 "the host pauses the processes of a loop of 1 kHz too long, three times in a row",
@@ -138,7 +138,7 @@ brake_hold = [{ index = 0x60fe, sub = 1, bytes = 4, value = 1 }, { index = 0x60f
                     sleep(Duration::from_millis(20));
                 }
                 let log = network.log(command);
-                !log.contains("frames do not come back") && !log.contains("has the fault 0x7500: reset it")
+                !log.contains("in a row are lost") && !log.contains("has the fault 0x7500: reset it")
             });
             if !is_complete {
                 return not_run::not_run(
@@ -187,6 +187,34 @@ fn commands_that_use_the_bus_for_a_moment() {
     let mut busy = network.driver("simulate d.toml m.toml --interface ec1");
     let text = String::from_utf8_lossy(&busy.output().unwrap().stderr).into_owned();
     assert!(text.contains("another hexad-ethercat uses ec1"), "{text}");
+}
+
+#[test]
+fn commands_that_move_or_measure_refuse_drives_without_serial_numbers() {
+    let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let Some(mut network) = simulated("serials", " --uncoupled") else { return };
+    let file = fs::read_to_string(network.path("d.toml")).unwrap();
+    let file =
+        (101..=106).fold(file, |file, serial| file.replace(&format!("serial = {serial}"), "serial = 0"));
+    fs::write(network.path("d.toml"), &file).unwrap();
+    network.start("simulate", network.driver("simulate d.toml m.toml --interface ec1 --uncoupled"));
+    network.wait_for("simulate", "switched on", 1);
+    for arguments in
+        ["check d.toml", "zero d.toml 1 --length-m 1.7", "jog d.toml 1 --unloaded", "run d.toml m.toml"]
+    {
+        let ended = network.driver(arguments).output().unwrap();
+        let text = String::from_utf8_lossy(&ended.stderr);
+        assert!(!ended.status.success() && text.contains("leg 1: its drive has no serial number"), "{text}");
+    }
+    assert_eq!(fs::read_to_string(network.path("d.toml")).unwrap(), file);
+    let accepted =
+        file.replace("[drive]", "[drive]\nidentity = \"position\"").replace("jogged_serial = 0\n", "");
+    fs::write(network.path("d.toml"), accepted).unwrap();
+    network.output(network.driver("jog d.toml 1 --unloaded"));
+    assert!(
+        network.output(network.driver("zero d.toml 1 --length-m 1.7")).contains("of no serial number (0)")
+    );
+    assert!(fs::read_to_string(network.path("d.toml")).unwrap().contains("jogged_position = 1"));
 }
 
 #[test]

@@ -74,6 +74,7 @@ DIAGNOSTIC_OSCILLATION = 134
 DIAGNOSTIC_PAYLOAD_CHANGED = 135
 DIAGNOSTIC_IMPACT = 136
 DIAGNOSTIC_DISTURBANCE_LASTING = 137
+DIAGNOSTIC_DRIVE_BUS_FAILED = 138
 DIAGNOSTIC_VELOCITY_ERROR = 122
 DIAGNOSTIC_FEEDBACK_SATURATED = 123
 LIMIT_BIT_FORCE = 0
@@ -151,7 +152,7 @@ class Measured(Message):
         ("drive_valid", c_uint32),  # What of the drives is filled in, a sum: 1 `drive_enabled`, 2 `brake_open`, 4 `drive_fault`, 8 `force_n`.
         ("drive_enabled", c_uint32),  # A bit for each drive that is enabled, the lowest for leg 1.
         ("brake_open", c_uint32),  # A bit for each brake that is open.
-        ("drive_fault", c_uint32),  # A bit for each drive with a fault.
+        ("drive_fault", c_uint32),  # A bit for each drive with a fault. Bit 6: the bus to the drives failed, and the lengths are no measurement.
         ("force_n", c_double * 6),  # Forces that act; positive pushes the platform away from the base. [N]
     ]
 

@@ -8,7 +8,7 @@ use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
 use crate::control::sensing::last_valid::{LastValid, check_stroke_with_tolerance, check_time_stamp};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::inputs::Measurement;
+use crate::control::signals::inputs::{DriveStatus, Measurement};
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
 use crate::model::machine::Actuator;
@@ -119,9 +119,15 @@ impl MeasurementValidator {
     ) -> Result<&Measurement, Diagnostic> {
         (self.released_before_ns, self.released_ns) = (self.released_ns, cycle.release_ns);
         let continuity = self.check_input_continuity(cycle);
-        let new = newest.filter(|newest| self.last.is_new(newest));
+        let fault = newest.map_or(0, |newest| newest.drives.fault.unwrap_or_default());
+        let has_bus_failed = fault & DriveStatus::BUS_FAILED != 0;
+        let new = newest.filter(|newest| !has_bus_failed && self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
         self.missed_cycles += u64::from(cycle.state.has_control() && !is_accepted);
+        // Before any consequence of it.
+        if has_bus_failed {
+            return Err(DiagnosticCode::DriveBusFailed.into());
+        }
         continuity?;
         let Some(valid) = &self.last.valid else {
             return Err(self.last.rejection_or(DiagnosticCode::NoMeasurement));

@@ -412,6 +412,10 @@ codes! {
         absolute("duration", "s", "exceeds", "the longest duration of an impact,"),
         "sudden disturbance that lasts",
         "check for a collision; check all drives; limits.disturbance_step_m_s2";
+    /// The driver reports that its bus to the drives failed: frames are lost, or a drive is missing. It has stopped all drives,
+    /// and the lengths of its messages are no measurement.
+    DriveBusFailed = 138, Brake, NO_NUMBER, "the bus to the drives failed",
+        "see the log of the driver; check cables and power of the drives and the load of the computer, then clear";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake,
         ratio("the velocity error", "the limit control.following_velocity_*"),

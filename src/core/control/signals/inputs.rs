@@ -86,13 +86,16 @@ pub struct DriveStatus {
     pub enabled: Option<u32>,
     /// Set of open brakes; `None` if not reported.
     pub brake_open: Option<u32>,
-    /// Set of drives with a fault; `None` if not reported.
+    /// Set of drives with a fault, and [`DriveStatus::BUS_FAILED`]; `None` if not reported.
     pub fault: Option<u32>,
     /// Actual forces \[N\]; `None` if not reported.
     pub force: Option<[f64; LEGS]>,
 }
 
 impl DriveStatus {
+    /// Bit of `fault` of a driver whose bus to the drives failed: the lengths beside it are no measurement.
+    pub const BUS_FAILED: u32 = 1 << LEGS;
+
     /// The first drive that is not enabled, or whose brake is closed.
     pub(in crate::control) fn first_unready_leg(&self) -> Option<usize> {
         let ready = self.enabled.unwrap_or(u32::MAX) & self.brake_open.unwrap_or(u32::MAX);
