@@ -226,6 +226,34 @@ fn values_that_are_wrong_by_a_thousand_are_warned_of() {
     }
 }
 
+#[test]
+fn more_noise_never_makes_the_estimator_faster() {
+    let mut refused = 0;
+    for file in others().chain(built()).chain([MOTION_BASE.into(), TSAI.into()]) {
+        let mut before_hz = f64::INFINITY;
+        for noise_m in (-28..=4).map(|quarter| 10_f64.powf(0.25 * f64::from(quarter))) {
+            let mut table: toml::Table = file.parse().unwrap();
+            table.insert(
+                "measured".into(),
+                toml::Table::from_iter([("length_noise_m".to_string(), noise_m.into())]).into(),
+            );
+            let Ok(config) = Config::parse(&table.to_string(), "a test") else { continue };
+            let estimator_hz = config.deployment.control.estimator_bandwidth_hz;
+            if estimator_hz > before_hz {
+                let errors = config.examine().errors;
+                assert!(
+                    errors.iter().any(|error| error.key == "measured.length_noise_m"),
+                    "{noise_m}: {errors:?}"
+                );
+                refused += 1;
+            } else {
+                before_hz = estimator_hz;
+            }
+        }
+    }
+    assert!(refused > 0);
+}
+
 /// What releases, schedules or simulates the loop is no property of the machine: no file becomes invalid by it, and none has other limits.
 #[test]
 fn keys_of_running_change_neither_validity_nor_limits() {

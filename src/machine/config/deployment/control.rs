@@ -219,8 +219,7 @@ impl Plant<'_> {
     fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
-        let intensity = disturbance * disturbance / (noise.length_m * noise.length_m * period_s);
-        let asked_hz = libm::pow(intensity, 1.0 / 6.0) / TAU;
+        let asked_hz = optimum_hz(disturbance, noise.length_m, period_s);
         let ratio = if drive.delay_s.is_some() { ESTIMATOR_RATIO } else { ESTIMATOR_RATIO_DELAY_UNKNOWN };
         let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
         // Another value in the file is wrong.
@@ -239,6 +238,11 @@ impl Plant<'_> {
         };
         first(is_stable_with_masses).or_else(|| first(SampledLoop::is_stable)).unwrap_or(largest_hz)
     }
+}
+
+/// Bandwidth of the estimator that is best for these disturbances and this noise of the lengths \[Hz\].
+pub(in crate::config) fn optimum_hz(disturbance: f64, noise_m: f64, period_s: f64) -> f64 {
+    libm::pow(disturbance * disturbance / (noise_m * noise_m * period_s), 1.0 / 6.0) / TAU
 }
 
 fn is_stable_with_masses(sampled: &SampledLoop) -> bool {

@@ -22,7 +22,7 @@ use hexad_core::control::supervision::in_position::InPositionWindow;
 use hexad_core::model::inverse_jacobian::leg_wrenches;
 use hexad_core::model::machine::Machine;
 
-mod control;
+pub(in crate::config) mod control;
 pub mod default_limits;
 mod hardware;
 mod limits;

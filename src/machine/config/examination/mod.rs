@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::control_loops::{ControlLoop, loops, unstable_timeout_ms};
+use super::deployment::control::optimum_hz;
 use super::{Config, ConfigError, Violation};
 
 mod envelope;
@@ -91,6 +92,16 @@ fn examine_loops(examiner: &mut Examiner) {
         if let Some(warning) = control_loop.warning() {
             examiner.warn(&format!("control.{axis}_bandwidth_hz"), format!("{bandwidth_hz}"), warning);
         }
+    }
+    let (control, noise_m) = (&deployment.control, deployment.noise.length_m);
+    let period_s = deployment.realtime.period_s();
+    let optimum_hz = optimum_hz(control.disturbance_m_s2_per_sqrt_s, noise_m, period_s);
+    if control.estimator_bandwidth_hz > optimum_hz {
+        let bound = format!(
+            "must be less: this noise needs an estimator of {:.2} Hz, and no loop with one as slow is stable; check its unit",
+            optimum_hz
+        );
+        examiner.error("measured.length_noise_m", format!("{noise_m}"), bound);
     }
     let Some((timeout_ms, age_ms)) = unstable_timeout_ms(deployment) else { return };
     let bound = format!(
