@@ -50,6 +50,27 @@ fn a_move_takes_control_after_whatever_was_before_or_says_why_not() {
 }
 
 #[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
+fn a_move_that_took_control_ends_when_control_ends() {
+    for (who, words) in [
+        ("plant", "hexad: the motion has ended: the daemon is in fault: measurement lost"),
+        ("daemon", "hexad: the motion has ended: no status of the daemon any more"),
+    ] {
+        let motion = ["--engage", "--motion", "sines", "--seconds", "40"];
+        let mut trio = Trio::standing(Machine::patient(&format!("ends_{who}")));
+        let player = Hexad::start(&trio.machine, "move", &motion);
+        trio.moves_after(0);
+        if who == "plant" {
+            trio.plant.kill()
+        } else {
+            trio.daemon.kill()
+        }
+        player.ends().fails(1, words);
+    }
+}
+
+#[test]
 #[apply(beside_others)]
 fn a_signal_brings_the_platform_to_rest_under_control() {
     let mut trio = Trio::in_motion("interrupted");

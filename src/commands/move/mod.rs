@@ -3,8 +3,8 @@
 //! The source begins at the pose of the platform, which the daemon's status contains. It moves the platform
 //! gently to the start of the trajectory, plays it and ends at rest. A platform that is held for a source that
 //! has ended is taken over. When an operator ends control, it ends
-//! too. After a fault or a restart of the daemon it starts again from the present pose. A signal slows the
-//! platform down along its path, to rest under control; the exit code is then 130. `--pause` and `--resume`
+//! too. After a fault or a restart of the daemon it starts again from the present pose, unless it has taken control itself: then
+//! it ends. A signal slows the platform down along its path, to rest under control; the exit code is then 130. `--pause` and `--resume`
 //! send requests to the running player.
 
 use std::io;
@@ -195,6 +195,8 @@ pub enum MoveError {
     Interrupted,
     #[error("the motion has ended: the daemon is in {state}: {reason}", state = .0.name(), reason = .1)]
     Ended(State, Diagnostic),
+    #[error("the motion has ended: no status of the daemon any more; is it stopped or killed?")]
+    Silent,
 }
 
 impl CommandError for MoveError {
@@ -202,7 +204,9 @@ impl CommandError for MoveError {
         match self {
             Self::Port(_) | Self::Signals(_) => false,
             Self::Operator(error) => error.has_begun(),
-            Self::NotEngaged(..) | Self::Ended(..) | Self::NoPlayer(_) | Self::Interrupted => true,
+            Self::NotEngaged(..) | Self::Ended(..) | Self::Silent | Self::NoPlayer(_) | Self::Interrupted => {
+                true
+            }
         }
     }
 

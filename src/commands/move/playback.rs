@@ -71,6 +71,8 @@ pub(super) struct Playback<'a> {
     reason: String,
     /// Whether the platform is to stand under control at the end of the motion.
     is_to_hold: bool,
+    /// Whether it ends when control ends: its own request for control is spent.
+    ends_with_control: bool,
     /// Whether the platform is to come to rest for good, and whether until resumed.
     is_ending: bool,
     is_to_pause: bool,
@@ -89,6 +91,7 @@ impl<'a> Playback<'a> {
             limits: config.deployment.limits.in_force(),
             trajectory,
             statuses,
+            ends_with_control: matches!(engagement, Engagement::Socket { .. }),
             engagement,
             phase: Phase::Waiting,
             status: None,
@@ -235,9 +238,9 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Starts again from the present pose. An error if the platform was to come to rest under control.
+    /// Starts again from the present pose. An error if the platform was to come to rest under control, or nobody waits for it to engage.
     fn start_over(&mut self) -> Result<(), MoveError> {
-        if self.is_ending || matches!(self.phase, Phase::Holding(..)) {
+        if self.ends_with_control || self.is_ending || matches!(self.phase, Phase::Holding(..)) {
             return Err(self.ended());
         }
         warn!("the daemon gave up control or is gone: starting again from the present pose");
@@ -248,8 +251,10 @@ impl<'a> Playback<'a> {
     /// The error of control that has ended.
     fn ended(&self) -> MoveError {
         let status = self.status.unwrap_or_default();
-        let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-        MoveError::Ended(status.state().unwrap_or_default(), diagnostic)
+        match status.state().unwrap_or_default() {
+            state if state.has_control() => MoveError::Silent,
+            state => MoveError::Ended(state, status.diagnostic.diagnostic().unwrap_or_default()),
+        }
     }
 
     fn setpoint(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {

@@ -6,6 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use clap::Args;
+use console::Term;
 
 use self::screen::Screen;
 use super::arguments::OptionalMachineFile;
@@ -92,7 +93,16 @@ impl StatusArguments {
         if !in_place {
             return Ok(print(text)?);
         }
-        let lines: String = text.lines().map(|line| format!("{line}{CLEAR_LINE}\n")).collect();
+        // What is beyond the last line would scroll the first ones away.
+        let rows = usize::from(Term::stdout().size().0);
+        let (shown, more) = match text.lines().count() {
+            count if count > rows => {
+                (rows.saturating_sub(1), "... (more lines: hexad status without --watch)")
+            }
+            count => (count, ""),
+        };
+        let lines = text.lines().take(shown).chain(Some(more).filter(|it| !it.is_empty()));
+        let lines: String = lines.map(|line| format!("{line}{CLEAR_LINE}\n")).collect();
         Ok(print(format_args!("{HOME}{}{CLEAR_BELOW}", lines.trim_end()))?)
     }
 }
