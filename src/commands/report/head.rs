@@ -91,9 +91,8 @@ pub fn of_recording(run: &Run, extents: &[Extent], kept: &str) -> String {
     };
     let (events, configuration) = (Events::new(run, history), run.configurations());
     let levels = extents.iter().map(level).collect();
-    let begin_s = history.begin_ns().wrapping_add(run.info().clock_offset_ns) as f64 * 1e-9;
     json(&Head {
-        begin_s,
+        begin_s: run.begin_s(),
         length_s: history.length_s(),
         levels,
         kept,

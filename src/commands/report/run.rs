@@ -101,6 +101,11 @@ impl Run {
         &self.first.info
     }
 
+    /// Unix time of the first cycle \[s\].
+    pub fn begin_s(&self) -> f64 {
+        self.history.begin_ns().wrapping_add(self.info().clock_offset_ns) as f64 * 1e-9
+    }
+
     /// The first configuration. A reload changes neither the machine nor the rate.
     pub fn config(&self) -> &Config {
         &self.first.config

@@ -30,15 +30,15 @@ pub fn facts(run: &Run) -> Vec<Fact> {
         "hexad {} (commit {commit}), fidelity {}, instruction set {}",
         info.version, info.fidelity, info.instruction_set
     );
-    let mut facts = live_facts(config, history, &history.times());
+    let mut facts = live_facts(config, history, &history.times(), Some(run.begin_s()));
     facts.extend(scaled_limits(config));
     facts.extend(configurations(run));
     facts.extend([lost(history), Fact { name: "Software", text: software, is_bad: false }]);
     facts
 }
 
-/// Facts of the run so far. `times`: wake-up and computation.
-pub fn live_facts(config: &Config, history: &History, times: &[Times; 2]) -> Vec<Fact> {
+/// Facts of the run so far. `times`: wake-up and computation; `begin_s`: Unix time of the first cycle, if it is shown.
+pub fn live_facts(config: &Config, history: &History, times: &[Times; 2], begin_s: Option<f64>) -> Vec<Fact> {
     let good = |name, text| Fact { name, text, is_bad: false };
     let rate_hz = config.deployment.realtime.rate_hz;
     let (length, cycles) = (duration(history.length_s()), thousands(history.cycles));
@@ -47,21 +47,26 @@ pub fn live_facts(config: &Config, history: &History, times: &[Times; 2]) -> Vec
     vec![
         good("Run", format!("{length} at {rate_hz} Hz, {cycles} cycles")),
         good("States", states.collect::<Vec<_>>().join(", ")),
-        faults(history),
+        faults(history, begin_s),
         tracking(history),
         missed(config, history),
         good("Times", times_in_words(times)),
     ]
 }
 
-fn faults(history: &History) -> Fact {
+fn faults(history: &History, begin_s: Option<f64>) -> Fact {
     let faults = &history.faults;
     let count = match faults.len() {
         0 => return Fact { name: "Faults", text: "none".into(), is_bad: false },
         1 => "one".to_string(),
         many => many.to_string(),
     };
-    let described = faults.iter().take(MAX_FAULTS).map(|fault| format!("at {:.3} s {}", fault.t, fault.text));
+    let clock =
+        |t: f64| begin_s.map_or_else(String::new, |begin_s| format!(" ({} UTC)", time_of_day(begin_s + t)));
+    let described = faults
+        .iter()
+        .take(MAX_FAULTS)
+        .map(|fault| format!("at {:.3} s{} {}", fault.t, clock(fault.t), fault.text));
     let text = format!("{count}: {}", described.collect::<Vec<_>>().join(". Then "));
     Fact { name: "Faults", text, is_bad: true }
 }
@@ -127,6 +132,12 @@ fn lost(history: &History) -> Fact {
         lost => format!("{}: these cycles are not in the recording", thousands(lost)),
     };
     Fact { name: "Records lost", text, is_bad: history.lost > 0 }
+}
+
+/// Time of day of a Unix time \[s\].
+fn time_of_day(unix_s: f64) -> String {
+    let second = unix_s.rem_euclid(86_400.0) as u64;
+    format!("{:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
 }
 
 /// Text of a duration, in suitable units.

@@ -153,7 +153,7 @@ impl<'a> Live<'a> {
             step_s: self.step_s(),
             first,
             samples,
-            facts: live_facts(self.config, &self.history, &[wakeup_ns, compute_ns]),
+            facts: live_facts(self.config, &self.history, &[wakeup_ns, compute_ns], None),
             tracks: self.history.tracks(),
             distributions: distributions.map(|(name, times)| Bars { name, times, bars: vec![] }).into(),
         })

@@ -34,9 +34,14 @@ function showAll() {
   if (!isFollowed) setRange(0, HEAD.length_s);
 }
 
+// Time of day of an instant of a recording, as in the log.
+function clock(t) {
+  return new Date(1000 * (HEAD.begin_s + t)).toISOString().slice(11, 23);
+}
+
 function setTime(t) {
   now = t;
-  byId("now").textContent = `${t.toFixed(4)} s`;
+  byId("now").textContent = `${t.toFixed(4)} s${HEAD.is_live ? "" : `, ${clock(t)} UTC`}`;
   moveCursors(t);
   instantChanged(t);
 }

@@ -68,7 +68,7 @@ function begin() {
   fillList();
   // uPlot draws at the end of the task.
   setTimeout(() => {
-    setTime(0.5 * HEAD.length_s);
+    setTime(firstFault() ?? 0.5 * HEAD.length_s);
     document.body.dataset.openMs = performance.now().toFixed(0);
     document.body.dataset.charts = String(charts.length);
   });

@@ -156,7 +156,9 @@ fn an_hour_opens_shows_everything_and_zooms_to_single_cycles_of_a_fault() {
     let facts = found["facts"].to_string();
     for words in [
         "1 h 0 min 0 s at 20 Hz",
-        &format!("one: at {:.3} s {sentence}", seconds(FAULT)),
+        // The run begins with the Unix time, in this test.
+        &format!("one: at {:.3} s (", seconds(FAULT)),
+        &format!(" UTC) {sentence}"),
         "position 5.00 µm RMS, 5.00 µm largest",
         "10: these cycles are not in the recording",
         "overruns: 0",
