@@ -16,12 +16,12 @@ pub fn show(is_json: bool) -> Result<(), Failure> {
     let mut found = endpoints(None);
     found.sort_by(|a, b| a.machine.cmp(&b.machine));
     let answers: Vec<_> = found.iter().filter_map(|endpoint| Some((endpoint, answer(endpoint)?))).collect();
+    if answers.is_empty() {
+        return Err(Failure { exit_code: 2, message: "no daemon runs on this host".into() });
+    }
     if is_json {
         let lines: String = answers.iter().map(|(_, answer)| answer.to_line()).collect();
         return Ok(print(lines)?);
-    }
-    if answers.is_empty() {
-        return Ok(print("no daemon runs on this host\n")?);
     }
     let columns = [
         ("machine", Left),
