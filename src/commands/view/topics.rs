@@ -163,3 +163,30 @@ fn motion_at(setpoint: &Setpoint, instant_ns: u64) -> Option<Motion> {
     let age_s = seconds_between(setpoint.time_ns, instant_ns);
     (0.0..MAX_SETPOINT_AGE_S).contains(&age_s).then(|| setpoint.task.after(age_s).motion())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simulated_time_that_begins_anew_is_followed() {
+        let name = format!("name = \"view-topics-{}\"", std::process::id());
+        let machine = include_str!("../../../config/fried2008.toml").replace("name = \"fried2008\"", &name);
+        let config =
+            Config::parse(&format!("{machine}\n[realtime]\nrelease = \"lockstep\""), "a test").unwrap();
+        let mut topics = Topics::join(&config).unwrap();
+        for begin_ns in [9_000_000_000, 1_000_000] {
+            let bus = config.join().unwrap();
+            let mut forces = bus.publisher::<ForceMessage>().unwrap().with_reproducible_epoch();
+            let mut statuses = bus.publisher::<StatusMessage>().unwrap();
+            for time_ns in begin_ns..begin_ns + 3 {
+                forces.publish(time_ns, ForceMessage::default()).unwrap();
+                // The daemon is killed before the last status.
+                if time_ns < begin_ns + 2 {
+                    statuses.publish(time_ns, StatusMessage::default()).unwrap();
+                }
+            }
+            assert_eq!(topics.cycles().len(), 2, "{begin_ns}");
+        }
+    }
+}
