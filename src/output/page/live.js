@@ -55,7 +55,8 @@ async function poll() {
     const isEmpty = levels.length === 0;
     levels = [liveLevel(fresh.step_s)];
     run = fresh.run;
-    if (!isEmpty) return fresh;
+    // Its state replaces the old one at once.
+    if (!isEmpty) return poll();
   }
   if (fresh.samples !== "") append(levels[0], fresh.first, fresh.samples);
   // To the last whole sample.
@@ -97,7 +98,7 @@ async function follow() {
       }
       [newest, cause] = [performance.now() - 1000 * fresh.age_s, fresh.silence];
     } catch (failure) {
-      cause = `this page shows no reply of hexad view (${failure.message}); is it still running?`;
+      cause = `this page can show no reply of hexad view, which has ended, is paused or failed (${failure.message})`;
     }
     showAge(newest, cause);
     document.body.dataset.result = JSON.stringify({
