@@ -123,11 +123,12 @@ fn without_its_token_nothing_is_shown_and_with_it_nothing_can_be_changed() {
 #[ignore = "second tier: needs Chromium"]
 #[apply(beside_others)]
 fn a_running_machine_is_shown_also_after_the_daemon_has_started_again() {
-    let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("view-live");
+    let Trio { setpoints, mut daemon, plant, recorder, machine } = Trio::in_motion("view-live");
     let view = View::start(&machine, &[]);
     let data = view.until("an active platform", |data| {
         states(data) == ["active"]
             && data["first"].as_u64() == Some(0)
+            && data["silence"] == ""
             && data["samples"].as_str().unwrap().len() > 90_000
     });
     assert_eq!(data["step_s"], 0.01);
@@ -141,19 +142,53 @@ fn a_running_machine_is_shown_also_after_the_daemon_has_started_again() {
             (Some(18), Some("active")),
             "{found}"
         );
+        assert!(found["age"].as_str().unwrap().starts_with("live, newest data 0."), "{found}");
+        assert_eq!([&found["alert"], &found["opacity"]], ["", "1"], "{found}");
     }
     let run = view.data(0)["run"].as_u64().unwrap();
-    daemon.stops();
+    let silent = |words: &str| view.until(words, |data| data["silence"].as_str().unwrap().contains(words));
+    daemon.hold();
+    silent(&format!("the daemon (process {}) sends nothing: it is starting, paused", daemon.id()));
+    daemon.kill();
+    let data = silent("no daemon of ");
+    assert!(data["age_s"].as_f64().unwrap() > 1.0 && states(&data).contains(&"active"), "{data}");
+    if let Some(browser) = Browser::find() {
+        let found = browser_shows(&browser, &view);
+        let [age, alert] = ["age", "alert"].map(|key| found[key].as_str().unwrap());
+        assert!(age.starts_with("not live, no new data for "), "{found}");
+        let since = alert.strip_prefix("No new data since ").and_then(|rest| rest.get(..10)).unwrap();
+        let digits = since.replace(|it: char| it.is_ascii_digit(), "0");
+        assert!(digits == "00:00:00: " && alert.contains("it has ended, was killed"), "{found}");
+        assert_eq!((found["opacity"].as_str(), found["error"].as_str()), (Some("0.45"), None), "{found}");
+    }
     drop(setpoints);
     let daemon = start_daemon(&machine);
     let setpoints = start_setpoints(&machine);
     engage(&machine);
     let data = view.until("the second daemon", |data| {
-        data["run"].as_u64() > Some(run) && states(data).contains(&"active")
+        data["run"].as_u64() > Some(run) && states(data).contains(&"active") && data["silence"] == ""
     });
     assert!(states(&data).len() < 8, "{:?}", states(&data));
+    if let Some(browser) = Browser::find() {
+        let found = browser_shows(&browser, &view);
+        assert_eq!([&found["alert"], &found["opacity"]], ["", "1"], "{found}");
+    }
     view.process.stops();
     drop((setpoints, daemon, plant, recorder));
+}
+
+#[test]
+#[apply(beside_others)]
+fn simulated_time_that_stands_still_is_said() {
+    let machine = Machine::with("view-simulated", "[realtime]\nrelease = \"lockstep\"");
+    let view = View::start(&machine, &[]);
+    let [plant, _daemon] = ["plant", "run"].map(|command| Hexad::start::<&str>(&machine, command, &[]));
+    let _source = start_setpoints(&machine);
+    view.until("simulated time", |data| data["length_s"].as_f64() > Some(0.5) && data["silence"] == "");
+    plant.hold();
+    view.until("that it stands still", |data| {
+        data["silence"].as_str().unwrap().starts_with("simulated time stands still")
+    });
 }
 
 /// Result that the live page leaves in the document by itself.

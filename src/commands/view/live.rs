@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
+use super::cause_of_silence;
 use crate::commands::report::head::json;
 use crate::commands::report::history::{Bars, History};
 use crate::commands::report::levels::{Extent, Level};
@@ -11,7 +12,9 @@ use crate::commands::report::signals::{CycleInstants, Signals};
 use crate::commands::report::summary::{Fact, live_facts};
 use crate::commands::report::track::Track;
 use crate::output::page::append_base64;
+use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::{CycleMessage, LoopCounters, LoopTimes, StatusMessage};
+use hexad_core::control::signals::time::seconds_between;
 use hexad_machine::config::Config;
 use hexad_machine::config::coordinates::Coordinates;
 
@@ -23,6 +26,9 @@ const KEPT_S: f64 = 60.0;
 
 /// Duration for which intervals are kept \[s\], as long as a page shows them.
 const INTERVALS_S: f64 = 120.0;
+
+/// Age of the newest data beyond which the page shows no present state \[s\].
+const MAX_AGE_S: f64 = 1.0;
 
 /// State of the live page.
 pub struct Live<'a> {
@@ -40,12 +46,20 @@ pub struct Live<'a> {
     times: LoopTimes,
     /// Number of the run, raised when the daemon changes.
     run: u64,
+    /// Epoch of the daemon's messages.
+    epoch: u64,
+    /// CLOCK_MONOTONIC instant of the newest data, of their arrival in simulated time; at first the start of the command \[ns\].
+    newest_ns: u64,
 }
 
 /// Reply to a page, as JSON.
 #[derive(Serialize)]
 struct Fresh<'a> {
     run: u64,
+    /// Age of the newest data.
+    age_s: f64,
+    /// Why there are no new data; empty if there are.
+    silence: String,
     length_s: f64,
     step_s: f64,
     /// Number of the first sample.
@@ -73,14 +87,17 @@ impl<'a> Live<'a> {
             counters: LoopCounters::default(),
             times: LoopTimes::default(),
             run: 0,
+            epoch: 0,
+            newest_ns: monotonic_ns(),
         }
     }
 
     /// Adds a cycle.
     pub fn add(&mut self, cycle: &CycleMessage, status: &StatusMessage) {
-        if status.counters.cycles < self.counters.cycles {
+        if status.header.epoch != self.epoch {
             // Another daemon has begun.
-            *self = Self { run: self.run + 1, ..Self::new(self.config, self.coordinates.clone()) };
+            let (run, epoch) = (self.run + 1, status.header.epoch);
+            *self = Self { run, epoch, ..Self::new(self.config, self.coordinates.clone()) };
         }
         // The times belong to other cycles. They are shown but not counted.
         let untimed = CycleMessage { wakeup_ns: 0, compute_ns: 0, ..*cycle };
@@ -88,6 +105,8 @@ impl<'a> Live<'a> {
         if !self.history.add(&untimed) {
             return;
         }
+        let is_simulated = self.config.deployment.realtime.is_simulated();
+        self.newest_ns = if is_simulated { monotonic_ns() } else { status.header.time_ns };
         let before = core::mem::replace(&mut self.counters, status.counters);
         if !is_first {
             let late = self.counters.late_wakeups.saturating_sub(before.late_wakeups);
@@ -147,8 +166,11 @@ impl<'a> Live<'a> {
             ("release to force sent", end_to_end_ns),
             ("age of the measurement", measured_age_ns),
         ];
+        let age_s = seconds_between(self.newest_ns, monotonic_ns());
         json(&Fresh {
             run: self.run,
+            age_s,
+            silence: if age_s > MAX_AGE_S { cause_of_silence(self.config) } else { String::new() },
             length_s: self.history.length_s(),
             step_s: self.step_s(),
             first,

@@ -106,6 +106,28 @@ fn check_user(machine: &str) -> Result<(), ForeignDaemon> {
     }
 }
 
+/// Why the daemon sends nothing, as far as this process can find out.
+fn cause_of_silence(config: &Config) -> String {
+    let name = &config.name;
+    let found: Vec<_> = endpoints(Some(name)).into_iter().filter(|it| it.daemon.is_some()).collect();
+    let own = found.iter().find(|it| it.is_own()).and_then(|it| it.daemon.as_ref()).map(|it| it.process_id);
+    match (own, found.first()) {
+        (Some(process), _) if config.deployment.realtime.is_simulated() => format!(
+            "simulated time stands still: the plant, the source of setpoints or the daemon (process {process}) is paused, or plant or source has ended"
+        ),
+        (Some(process), _) => {
+            format!("the daemon (process {process}) sends nothing: it is starting, paused (SIGSTOP) or hangs")
+        }
+        (None, Some(other)) => {
+            let user = user_name(other.owner);
+            format!("a daemon of user {user} runs {name} now: run hexad view as {user}")
+        }
+        (None, None) => format!(
+            "no daemon of {name} is found on this host: it has ended, was killed, or restarts; this page shows the next one by itself"
+        ),
+    }
+}
+
 /// Reply to a path and its query.
 fn reply(
     config: &Config,

@@ -30,6 +30,8 @@ pub struct Topics {
     forces: Subscriber<ForceMessage>,
     statuses: Subscriber<StatusMessage>,
     timings: Subscriber<StatisticsMessage>,
+    /// Epoch of the last status.
+    epoch: u64,
     /// The newest statistics.
     pub statistics: StatisticsMessage,
     /// For each topic: the newest message that is not newer than the last cycle, and later ones.
@@ -40,6 +42,7 @@ pub struct Topics {
 }
 
 /// Messages with an instant.
+#[derive(Default)]
 struct Newest<T> {
     message: Option<T>,
     later: VecDeque<T>,
@@ -66,9 +69,10 @@ impl Topics {
             forces: bus.subscriber(TOPIC_DEPTH)?,
             statuses: bus.subscriber(TOPIC_DEPTH)?,
             timings: bus.subscriber(1)?,
+            epoch: 0,
             statistics: StatisticsMessage::default(),
-            setpoint: Newest { message: None, later: VecDeque::new() },
-            measurement: Newest { message: None, later: VecDeque::new() },
+            setpoint: Newest::default(),
+            measurement: Newest::default(),
             pending: VecDeque::new(),
         })
     }
@@ -77,7 +81,8 @@ impl Topics {
     pub fn cycles(&mut self) -> Vec<(CycleMessage, StatusMessage)> {
         let statuses: Vec<_> = core::iter::from_fn(|| self.statuses.receive()).collect();
         // A status follows its force, so the forces of these statuses have arrived.
-        self.pending.extend(core::iter::from_fn(|| self.forces.receive()));
+        // In simulated time the epoch of forces is the same after a restart. Their status decides.
+        self.pending.extend(core::iter::from_fn(|| self.forces.receive_from_any()));
         self.setpoint.later.extend(core::iter::from_fn(|| self.setpoints.receive()));
         self.measurement.later.extend(core::iter::from_fn(|| self.measured.receive()));
         self.statistics = self.timings.receive_latest().unwrap_or(self.statistics);
@@ -85,7 +90,14 @@ impl Topics {
         for status in statuses {
             // Both have the same time stamp.
             let time_ns = status.header.time_ns;
-            while self.pending.front().is_some_and(|force| force.header.time_ns < time_ns) {
+            let is_first = core::mem::replace(&mut self.epoch, status.header.epoch) != status.header.epoch;
+            if is_first {
+                // Simulated time begins anew with the daemon: messages of before may be later.
+                (self.setpoint, self.measurement) = Default::default();
+            }
+            let is_of_before =
+                |it: &ForceMessage| it.header.time_ns < time_ns || is_first && it.header.time_ns != time_ns;
+            while self.pending.front().is_some_and(is_of_before) {
                 self.pending.pop_front();
             }
             let Some(force) = self.pending.front().filter(|force| force.header.time_ns == time_ns) else {
@@ -150,4 +162,31 @@ fn cycle(
 fn motion_at(setpoint: &Setpoint, instant_ns: u64) -> Option<Motion> {
     let age_s = seconds_between(setpoint.time_ns, instant_ns);
     (0.0..MAX_SETPOINT_AGE_S).contains(&age_s).then(|| setpoint.task.after(age_s).motion())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simulated_time_that_begins_anew_is_followed() {
+        let name = format!("name = \"view-topics-{}\"", std::process::id());
+        let machine = include_str!("../../../config/fried2008.toml").replace("name = \"fried2008\"", &name);
+        let config =
+            Config::parse(&format!("{machine}\n[realtime]\nrelease = \"lockstep\""), "a test").unwrap();
+        let mut topics = Topics::join(&config).unwrap();
+        for begin_ns in [9_000_000_000, 1_000_000] {
+            let bus = config.join().unwrap();
+            let mut forces = bus.publisher::<ForceMessage>().unwrap().with_reproducible_epoch();
+            let mut statuses = bus.publisher::<StatusMessage>().unwrap();
+            for time_ns in begin_ns..begin_ns + 3 {
+                forces.publish(time_ns, ForceMessage::default()).unwrap();
+                // The daemon is killed before the last status.
+                if time_ns < begin_ns + 2 {
+                    statuses.publish(time_ns, StatusMessage::default()).unwrap();
+                }
+            }
+            assert_eq!(topics.cycles().len(), 2, "{begin_ns}");
+        }
+    }
 }
