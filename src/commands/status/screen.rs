@@ -216,8 +216,7 @@ pub(in crate::commands) mod tests {
             process_id: 4_194_304,
             command: "a".repeat(15),
             user: "operator".into(),
-            is_ignored: false,
-            input: None,
+            ..ProcessReport::default()
         };
         let source = |topic: &str| SourceReport {
             topic: topic.into(),

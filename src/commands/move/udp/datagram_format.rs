@@ -235,9 +235,9 @@ impl DatagramFormat {
         }
         let mut places: Vec<_> = fields.iter().flatten().map(|field| field.place(file.encoding)).collect();
         places.sort_unstable();
-        if let Some([_, (_, [at, _])]) =
-            places.array_windows().find(|[(a, [_, end]), (b, [at, _])]| a == b && at < end)
-        {
+        let mut neighbours = places.iter().zip(places.iter().skip(1));
+        let overlap = neighbours.find(|((a, [_, end]), (b, [at, _]))| a == b && at < end);
+        if let Some((_, (_, [at, _]))) = overlap {
             return Err(format!("at = {at} is part of two numbers"));
         }
         let needed = places.iter().map(|(_, [_, end])| *end).max().unwrap_or(0);

@@ -13,7 +13,6 @@ use hexad_core::model::machine::Link;
 use nalgebra::Vector3;
 
 /// A ratio of a value of the file.
-#[derive(Clone)]
 struct Ratio {
     key: &'static str,
     /// Number, and of what it is this multiple.
@@ -28,8 +27,9 @@ pub(super) fn examine(examiner: &mut Examiner) {
         let bound = "on the Earth it is 9.76 to 9.84 m/s^2, in space 0; check its unit, or the site";
         examiner.warn("gravity_m_s2", format!("{} long", rounded(gravity)), bound);
     }
-    let ratios = [body_ratios(examiner), drive_ratios(examiner), deployment_ratios(examiner)].concat();
-    for Ratio { key, ratio, of, usual } in ratios {
+    let ratios = [body_ratios, drive_ratios, limit_ratios, sensor_ratios, pair_ratios];
+    for Ratio { key, ratio, of, usual } in ratios.into_iter().flat_map(|of| of(examiner)).collect::<Vec<_>>()
+    {
         // Zero: without it. Infinite: without a bound.
         if ratio == 0.0 || !ratio.is_finite() || usual.contains(&ratio) || !examiner.is_stated(key) {
             continue;
@@ -135,123 +135,104 @@ fn drive_ratios(examiner: &Examiner) -> Vec<Ratio> {
     ]
 }
 
-/// Limits and tolerances against each other, lengths against angles at the radius of the joints.
-fn deployment_ratios(examiner: &Examiner) -> Vec<Ratio> {
-    let deployment = &examiner.config.deployment;
+/// Limits against what they limit.
+fn limit_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let machine = &examiner.config.machine;
-    let (control, limits, noise) = (&deployment.control, &deployment.limits, &deployment.noise);
-    let (linear, angular) = (&limits.reference.position, &limits.reference.orientation);
-    let (radius, stroke) = (machine.joints.radius, machine.actuator.max_length - machine.actuator.min_length);
+    let (limits, control) = (&examiner.config.deployment.limits, &examiner.config.deployment.control);
+    let (linear, actuator) = (&limits.reference.position, &machine.actuator);
+    let stroke = actuator.max_length - actuator.min_length;
     let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
-    let window = &deployment.in_position;
-    let rounding = if noise.length_step_m > 0.0 { noise.length_m / noise.length_step_m } else { 0.0 };
-    let mut ratios = vec![
+    let payload = limits.payload_change_kg.unwrap_or_default() / machine.platform.mass;
+    let [step, change] =
+        [limits.disturbance_step_m_s2.unwrap_or_default(), control.disturbance_m_s2_per_sqrt_s]
+            .map(|disturbance| disturbance / linear.acceleration);
+    const ACCELERATION: &str = "limits.acceleration_m_s2";
+    vec![
         ratio(
             "limits.velocity_m_s",
             stroke / linear.velocity,
             "a second for the whole stroke",
             0.005..=150.0,
         ),
-        ratio(
-            "limits.payload_change_kg",
-            limits.payload_change_kg.unwrap_or_default() / machine.platform.mass,
-            "platform.mass_kg",
-            0.005..=3.0,
-        ),
-        ratio(
-            "limits.disturbance_step_m_s2",
-            limits.disturbance_step_m_s2.unwrap_or_default() / linear.acceleration,
-            "limits.acceleration_m_s2",
-            0.03..=10.0,
-        ),
+        ratio("limits.payload_change_kg", payload, "platform.mass_kg", 0.005..=3.0),
+        ratio("limits.disturbance_step_m_s2", step, ACCELERATION, 0.03..=10.0),
+        ratio("control.disturbance_m_s2_per_sqrt_s", change, ACCELERATION, 0.03..=10.0),
         ratio(
             "limits.force_rate_n_s",
-            limits.force_rate_n_s / machine.actuator.max_force,
+            limits.force_rate_n_s / actuator.max_force,
             "actuator.max_force_n in a second",
             3.0..=900.0,
         ),
         ratio("limits.stroke_margin_m", limits.stroke_margin_m / stroke, "the stroke", 3e-4..=0.2),
-        ratio(
-            "control.disturbance_m_s2_per_sqrt_s",
-            control.disturbance_m_s2_per_sqrt_s / linear.acceleration,
-            "limits.acceleration_m_s2",
-            0.03..=10.0,
-        ),
-        ratio("measured.length_noise_m", noise.length_m / stroke, "the stroke", 0.0..=1e-3),
-        ratio("measured.length_noise_m", rounding, "measured.length_step_m", 0.1..=30.0),
-        ratio(
-            "measured.pose_tolerance_m",
-            noise.pose_tolerance_m / noise.length_m,
-            "measured.length_noise_m",
-            20.0..=15000.0,
-        ),
+    ]
+}
+
+/// Noise and steps of the sensors.
+fn sensor_ratios(examiner: &Examiner) -> Vec<Ratio> {
+    let (actuator, noise) = (&examiner.config.machine.actuator, &examiner.config.deployment.noise);
+    let stroke = actuator.max_length - actuator.min_length;
+    let per_step = if noise.length_step_m > 0.0 { noise.length_m / noise.length_step_m } else { 0.0 };
+    let rate = noise.rate_m_s.unwrap_or_default() / actuator.max_rate;
+    let tolerance = noise.pose_tolerance_m / noise.length_m;
+    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
+    const NOISE: &str = "measured.length_noise_m";
+    vec![
+        ratio(NOISE, noise.length_m / stroke, "the stroke", 0.0..=1e-3),
+        ratio(NOISE, per_step, "measured.length_step_m", 0.1..=30.0),
         ratio("measured.length_step_m", noise.length_step_m / stroke, "the stroke", 0.0..=3e-3),
-        ratio(
-            "measured.rate_noise_m_s",
-            noise.rate_m_s.unwrap_or_default() / machine.actuator.max_rate,
-            "actuator.max_rate_m_s",
-            0.0..=0.1,
-        ),
+        ratio("measured.pose_tolerance_m", tolerance, NOISE, 20.0..=15_000.0),
+        ratio("measured.rate_noise_m_s", rate, "actuator.max_rate_m_s", 0.0..=0.1),
+    ]
+}
+
+/// Two keys of which either may be wrong: lengths against angles at the radius of the joints, tolerances against each other. Named as
+/// the stated one of both.
+fn pair_ratios(examiner: &Examiner) -> Vec<Ratio> {
+    let deployment = &examiner.config.deployment;
+    let (control, limits) = (&deployment.control, &deployment.limits.reference);
+    let (linear, angular, window) = (&limits.position, &limits.orientation, &deployment.in_position);
+    let at_radius = |linear: f64, angular: f64| linear / angular / examiner.config.machine.joints.radius;
+    let velocity = at_radius(linear.velocity, angular.velocity);
+    let acceleration = at_radius(linear.acceleration, angular.acceleration);
+    let tolerance = at_radius(window.tolerance_m, window.tolerance_rad);
+    let engage = [
+        control.engage_position_m / control.following_position_m,
+        control.engage_orientation_rad / control.following_orientation_rad,
     ];
-    // Named as the stated one of both.
-    let mut pairs = |keys: [&'static str; 2], found: f64, of: &'static str, usual: RangeInclusive<f64>| {
-        let [first, second] = keys;
-        let key = if examiner.is_stated(first) { first } else { second };
-        ratios.push(ratio(key, found, of, usual));
-    };
+    let following = [
+        control.following_velocity_m_s / linear.velocity,
+        control.following_velocity_rad_s / angular.velocity,
+    ];
+    let jerk = [linear, angular].map(|bound| bound.jerk / bound.acceleration);
     const ANGLES: &str = "that of the rotation, at the radius of the joints";
-    let at_radius = |linear: f64, angular: f64| linear / angular / radius;
-    pairs(
-        ["limits.velocity_m_s", "limits.velocity_rad_s"],
-        at_radius(linear.velocity, angular.velocity),
-        ANGLES,
-        0.08..=12.0,
-    );
-    pairs(
-        ["limits.acceleration_m_s2", "limits.acceleration_rad_s2"],
-        at_radius(linear.acceleration, angular.acceleration),
-        ANGLES,
-        0.05..=20.0,
-    );
-    for (keys, bound) in [
-        (["limits.jerk_m_s3", "limits.acceleration_m_s2"], linear),
-        (["limits.jerk_rad_s3", "limits.acceleration_rad_s2"], angular),
-    ] {
-        pairs(keys, bound.jerk / bound.acceleration, "the acceleration in a second", 3.0..=2000.0);
-    }
-    for (keys, engage, following) in [
-        (
-            ["control.engage_position_m", "control.following_position_m"],
-            control.engage_position_m,
-            control.following_position_m,
-        ),
+    const IN_A_SECOND: &str = "the acceleration in a second";
+    let rows = [
+        (["limits.velocity_m_s", "limits.velocity_rad_s"], velocity, ANGLES, 0.08..=12.0),
+        (["limits.acceleration_m_s2", "limits.acceleration_rad_s2"], acceleration, ANGLES, 0.05..=20.0),
+        (["limits.jerk_m_s3", "limits.acceleration_m_s2"], jerk[0], IN_A_SECOND, 3.0..=2000.0),
+        (["limits.jerk_rad_s3", "limits.acceleration_rad_s2"], jerk[1], IN_A_SECOND, 3.0..=2000.0),
+        (["control.engage_position_m", "control.following_position_m"], engage[0], FOLLOWING, 0.005..=1.0),
         (
             ["control.engage_orientation_rad", "control.following_orientation_rad"],
-            control.engage_orientation_rad,
-            control.following_orientation_rad,
+            engage[1],
+            FOLLOWING,
+            0.005..=1.0,
         ),
-    ] {
-        pairs(keys, engage / following, "control.following_*", 0.005..=1.0);
-    }
-    for (keys, following, limit) in [
         (
             ["control.following_velocity_m_s", "limits.velocity_m_s"],
-            control.following_velocity_m_s,
-            linear.velocity,
+            following[0],
+            "limits.velocity_m_s",
+            0.02..=4.0,
         ),
         (
             ["control.following_velocity_rad_s", "limits.velocity_rad_s"],
-            control.following_velocity_rad_s,
-            angular.velocity,
+            following[1],
+            "limits.velocity_rad_s",
+            0.02..=4.0,
         ),
-    ] {
-        pairs(keys, following / limit, "limits.velocity_*", 0.02..=4.0);
-    }
-    pairs(
-        ["in_position.tolerance_m", "in_position.tolerance_rad"],
-        at_radius(window.tolerance_m, window.tolerance_rad),
-        ANGLES,
-        0.03..=30.0,
-    );
-    ratios
+        (["in_position.tolerance_m", "in_position.tolerance_rad"], tolerance, ANGLES, 0.03..=30.0),
+    ];
+    const FOLLOWING: &str = "the same of control.following";
+    let named = |[first, second]: [&'static str; 2]| if examiner.is_stated(first) { first } else { second };
+    rows.into_iter().map(|(keys, ratio, of, usual)| Ratio { key: named(keys), ratio, of, usual }).collect()
 }
