@@ -6,12 +6,11 @@ use super::ReportError;
 use super::history::History;
 use super::levels::{self, Level};
 use super::signals::{CycleInstants, Signals};
-use hexad_daemon::recording::reader::{Recording, Summary};
+use hexad_daemon::recording::reader::{Recording, Summary, with_cycles};
 use hexad_daemon::recording::{Item, RecordingError, RunInfo};
 use hexad_machine::config::Config;
 use hexad_machine::config::changes::changes;
 use hexad_machine::config::coordinates::Coordinates;
-use hexad_machine::text::files::remark;
 
 /// Part of a run with one configuration.
 pub struct Part {
@@ -40,29 +39,13 @@ pub struct Run {
 impl Run {
     /// Reads the history. All files must be of one run of a daemon.
     pub fn read(recordings: &[PathBuf]) -> Result<Self, ReportError> {
-        let (mut files, mut empty) = (vec![], None);
-        for path in recordings {
-            let recording = Recording::open(path)?;
-            let summary = match recording.summary() {
-                Err(error @ RecordingError::Empty(_)) => {
-                    if recordings.len() > 1 {
-                        remark(format_args!(
-                            "{}: it is left out: no complete cycle is in it",
-                            path.display()
-                        ));
-                    }
-                    empty.get_or_insert(error);
-                    continue;
-                }
-                summary => summary?,
-            };
-            recording.remark(&summary);
-            files.push((path.clone(), summary));
-        }
+        let mut files = with_cycles(recordings)?;
+        files.iter().for_each(|(recording, summary)| recording.remark(summary));
         files.sort_by_key(|(_, summary)| summary.first.release_ns);
-        let mut files = files.into_iter();
+        let mut files =
+            files.into_iter().map(|(recording, summary)| (recording.path().to_path_buf(), summary));
         let Some((first_path, summary)) = files.next() else {
-            return Err(empty.unwrap_or_else(|| RecordingError::Empty(PathBuf::new())).into());
+            return Err(RecordingError::Empty(PathBuf::new()).into());
         };
         let mut newest = Part::new(first_path.clone(), summary, None)?;
         let mut ended = vec![];

@@ -175,7 +175,7 @@ impl Continuous {
         if self.interruption.note() {
             let free = self.interruption.free_text();
             warn!(
-                "the recording is interrupted, with {free}: {error}; it goes on in a new file once there is room"
+                "the recording is interrupted: {error}, with {free}; it goes on in a new file once there is room"
             );
         }
     }
