@@ -168,6 +168,7 @@ pub(super) fn run(
         request_reload: request_reload.clone(),
         reloaded,
         windows: recorder_links.orders,
+        interruption: recorder_links.interruption,
         jobs,
         motion_snapshots,
         is_ending: &flags.is_ending,

@@ -1,6 +1,6 @@
 //! Cycles under control in recordings, as the identification needs them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::commands::failure::Failure;
 use hexad_client::messages::CycleMessage;
 use hexad_core::model::LEGS;
 use hexad_daemon::recording::Item;
-use hexad_daemon::recording::reader::Recording;
+use hexad_daemon::recording::reader::{Recording, with_cycles};
 use hexad_machine::analysis::drive_delay::{MeasuredMotion, RecordedStretch};
 use hexad_machine::analysis::force_integrals::SentForce;
 use hexad_machine::config::Config;
@@ -25,15 +25,14 @@ impl Recorded {
     /// Reads recordings of one machine.
     pub fn read(&mut self, paths: &[PathBuf]) -> Result<Vec<RecordedStretch>, Failure> {
         let mut stretches = vec![];
-        for path in paths {
-            stretches.append(&mut self.read_one(path)?);
+        for (recording, _) in with_cycles(paths)? {
+            stretches.append(&mut self.read_one(&recording)?);
         }
         Ok(stretches)
     }
 
-    fn read_one(&mut self, path: &Path) -> Result<Vec<RecordedStretch>, Failure> {
+    fn read_one(&mut self, recording: &Recording) -> Result<Vec<RecordedStretch>, Failure> {
         let mut reader = StretchReader::default();
-        let recording = Recording::open(path)?;
         let summary = recording.each(|item| match item {
             Item::Cycle(cycle) => reader.add(&cycle),
             Item::Gap(_) => reader.end(),
@@ -49,7 +48,7 @@ impl Recorded {
             }
             // The recorded poses were computed from them.
             if joints(other) != joints(&config) {
-                return Err(IdentifyError::OtherJoints(path.into()).into());
+                return Err(IdentifyError::OtherJoints(recording.path().into()).into());
             }
         }
         self.configuration = Some((config, text));

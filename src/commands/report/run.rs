@@ -6,7 +6,7 @@ use super::ReportError;
 use super::history::History;
 use super::levels::{self, Level};
 use super::signals::{CycleInstants, Signals};
-use hexad_daemon::recording::reader::{Recording, Summary};
+use hexad_daemon::recording::reader::{Recording, Summary, with_cycles};
 use hexad_daemon::recording::{Item, RecordingError, RunInfo};
 use hexad_machine::config::Config;
 use hexad_machine::config::changes::changes;
@@ -39,15 +39,11 @@ pub struct Run {
 impl Run {
     /// Reads the history. All files must be of one run of a daemon.
     pub fn read(recordings: &[PathBuf]) -> Result<Self, ReportError> {
-        let mut files = vec![];
-        for path in recordings {
-            let recording = Recording::open(path)?;
-            let summary = recording.summary()?;
-            recording.remark(&summary);
-            files.push((path.clone(), summary));
-        }
+        let mut files = with_cycles(recordings)?;
+        files.iter().for_each(|(recording, summary)| recording.remark(summary));
         files.sort_by_key(|(_, summary)| summary.first.release_ns);
-        let mut files = files.into_iter();
+        let mut files =
+            files.into_iter().map(|(recording, summary)| (recording.path().to_path_buf(), summary));
         let Some((first_path, summary)) = files.next() else {
             return Err(RecordingError::Empty(PathBuf::new()).into());
         };

@@ -26,6 +26,7 @@ use self::status::StatusSource;
 use super::motion_requests::job::Job;
 use super::pose_gate::PoseGate;
 use super::recorder::WindowOrder;
+use super::recorder::interruption::Interruption;
 use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
 use hexad_client::messages::clock::monotonic_ns;
@@ -88,6 +89,8 @@ pub(super) struct ControlLinks<'a> {
     pub reloaded: Receiver<Reloaded>,
     /// Orders of recordings, to the recorder.
     pub windows: SyncSender<WindowOrder>,
+    /// Interruption of the recording, from the recorder.
+    pub interruption: Arc<Interruption>,
     /// Motions and snapshots, to the motion thread.
     pub jobs: Sender<Job>,
     pub motion_snapshots: Writer<Snapshot>,
@@ -161,7 +164,7 @@ impl<'a> Server<'a> {
             accepted: 0,
             is_ending: links.is_ending,
             connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
-            status: StatusSource::new(loaded),
+            status: StatusSource::new(loaded, links.interruption),
             clock: monotonic_ns,
             woke_ns: monotonic_ns(),
             stale_until_ns: 0,

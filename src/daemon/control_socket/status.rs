@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use crate::control_socket::answer::diagnostic_report;
 use crate::process_names::{command, sentence};
+use crate::recorder::interruption::Interruption;
 use crate::reload::Loaded;
 use crate::snapshot::Snapshot;
 use crate::version::VERSION as BUILD;
@@ -35,6 +36,7 @@ const MAX_INPUTS: usize = 16;
 pub struct StatusSource {
     loaded: Arc<Loaded>,
     reloads: u64,
+    interruption: Arc<Interruption>,
     /// Process of the client whose motion the daemon publishes.
     pub mover: Option<u32>,
     /// Stops so far.
@@ -61,8 +63,9 @@ impl Topics {
 
 impl StatusSource {
     /// Source for a machine.
-    pub fn new(loaded: Arc<Loaded>) -> Self {
-        Self { loaded, reloads: 0, mover: None, stops: None, topics: None, inputs: BTreeMap::new() }
+    pub fn new(loaded: Arc<Loaded>, interruption: Arc<Interruption>) -> Self {
+        let inputs = BTreeMap::new();
+        Self { loaded, reloads: 0, interruption, mover: None, stops: None, topics: None, inputs }
     }
 
     /// Keeps what a process says of its input, for as long as it publishes setpoints.
@@ -103,6 +106,7 @@ impl StatusSource {
         let loaded = self.loaded.clone();
         let Config { name, machine, deployment, place, .. } = &loaded.config;
         let status = &snapshot.status;
+        let deleted = are_segments_deleted().then(|| SEGMENTS_DELETED.into());
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
         let setpoint = snapshot.setpoint.filter(|setpoint| setpoint.task.is_finite());
         let follows = status.state().is_some_and(State::follows);
@@ -112,7 +116,7 @@ impl StatusSource {
             machine: name.clone(),
             process_id: process::id(),
             stops: self.stops,
-            warnings: are_segments_deleted().then(|| SEGMENTS_DELETED.into()).into_iter().collect(),
+            warnings: deleted.into_iter().chain(self.interruption.warning(now_ns)).collect(),
             configuration: ConfigurationReport {
                 file: place.clone(),
                 sha1: loaded.sha1.clone(),
@@ -254,8 +258,8 @@ mod tests {
         (snapshot.status.condition, snapshot.status.time_to_singularity_s) = (f64::INFINITY, f64::INFINITY);
         (snapshot.status.setpoint_error_valid, snapshot.status.setpoint_position_error_m) = (1, [1e200; 3]);
         // Without topics, the processes are unknown.
-        let mut source =
-            StatusSource { topics: Some(None), ..StatusSource::new(Arc::new(Loaded::new(config))) };
+        let source = StatusSource::new(Arc::new(Loaded::new(config)), Arc::default());
+        let mut source = StatusSource { topics: Some(None), ..source };
         let line = source.answer(&snapshot, 2).to_line();
         let answer: AnswerLine = serde_json::from_str(&line).unwrap();
         let report = answer.status.unwrap();

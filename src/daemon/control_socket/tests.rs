@@ -86,6 +86,7 @@ impl World {
             request_reload,
             reloaded: results,
             windows,
+            interruption: Arc::default(),
             jobs: jobs_in,
             motion_snapshots: triple_buffer(Snapshot::default()).0,
             is_ending: &NOBODY_ENDS,

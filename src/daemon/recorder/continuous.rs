@@ -4,15 +4,17 @@
 //! with the first cycle that may be missing on disk. No cycle is lost while the tape still holds that cycle.
 
 use std::fs;
+use std::sync::Arc;
 
 use tracing::{info, warn};
 
 use super::Context;
 use super::folder::Folder;
+use super::interruption::Interruption;
 use super::stream::Stream;
 use super::tape::Tape;
 use crate::recording::RecordingError;
-use crate::recording::file::RecordingFile;
+use crate::recording::file::{RecordingFile, remove_if_empty};
 use hexad_client::messages::CycleMessage;
 
 /// Time between two attempts while the disk accepts no data \[s\].
@@ -28,7 +30,7 @@ pub struct Continuous {
     /// The first cycle that may be missing on disk: the first of a second, or of a file.
     unsaved_cycle: u64,
     /// Whether the disk has recently accepted no data.
-    is_interrupted: bool,
+    interruption: Arc<Interruption>,
     /// No attempt is made before this cycle.
     retry_cycle: u64,
     /// Cycles that were not on disk when memory had no more room for them, or when the run ended.
@@ -39,14 +41,14 @@ pub struct Continuous {
 
 impl Continuous {
     /// Recording into a folder, from the first cycle on.
-    pub fn new(folder: Folder) -> Self {
+    pub fn new(folder: Folder, interruption: Arc<Interruption>) -> Self {
         Self {
             folder,
             files: 0,
             ended_bytes: 0,
             stream: None,
             unsaved_cycle: 1,
-            is_interrupted: false,
+            interruption,
             retry_cycle: 0,
             unwritten: 0,
             counted_cycle: 0,
@@ -83,20 +85,22 @@ impl Continuous {
     pub fn finish(&mut self, context: &Context, tape: &Tape) {
         self.retry_cycle = 0;
         self.advance(context, tape);
-        if self.is_interrupted && self.stream.is_none() {
+        if self.interruption.is_ongoing() && self.stream.is_none() {
             let lost = self.count_unwritten(tape.newest() + 1);
             warn!(lost, "the recording ends with cycles that are not on disk");
         }
         let Some(stream) = self.stream.take() else { return };
         self.ended_bytes += stream.file().bytes();
+        let path = stream.file().path().to_path_buf();
         match stream.finish() {
             Ok(path) => info!("the recording is in {}", path.display()),
+            Err(error) if remove_if_empty(&path) => warn!("the last part of the recording is lost: {error}"),
             Err(error) => warn!("the recording is not complete: {error}; `hexad recover` completes it"),
         }
     }
 
     fn write(&mut self, context: &Context, tape: &Tape) -> Result<(), RecordingError> {
-        if self.is_interrupted && self.stream.is_none() {
+        if self.interruption.is_ongoing() && self.stream.is_none() {
             self.count_unwritten(tape.oldest());
         }
         let next_cycle = self.stream.as_ref().map_or(self.unsaved_cycle, Stream::next_cycle);
@@ -131,10 +135,10 @@ impl Continuous {
         let Some(stream) = &mut self.stream else { return Ok(()) };
         stream.flush()?;
         self.unsaved_cycle = cycle.cycle;
-        if self.is_interrupted {
-            self.is_interrupted = false;
+        if self.interruption.is_ongoing() {
             let (path, unwritten) = (stream.file().path().display(), self.unwritten);
-            info!(unwritten, "the recording goes on in {path}");
+            let lasted_s = self.interruption.end();
+            info!(unwritten, "the recording goes on in {path}: for {lasted_s:.0} s nothing was written");
         }
         if let Some(full) = self.stream.take_if(|stream| stream.file().bytes() >= self.folder.file_bytes()) {
             self.ended_bytes += full.file().bytes();
@@ -149,25 +153,30 @@ impl Continuous {
         context: &Context,
         first_cycle: u64,
     ) -> Result<Stream, RecordingError> {
+        let path = folder.next_path(&format!("{:03}", *files + 1));
+        let file = RecordingFile::create(&path, &context.info, None)?;
         *files += 1;
-        let path = folder.next_path(&format!("{files:03}"));
-        Ok(Stream::new(RecordingFile::create(&path, &context.info, None)?, first_cycle))
+        Ok(Stream::new(file, first_cycle))
     }
 
     fn interrupt(&mut self, error: &RecordingError) {
-        if !self.is_interrupted {
-            self.is_interrupted = true;
-            warn!("the recording is interrupted: {error}; it goes on in a new file once there is room");
+        if let Some(stream) = self.stream.take() {
+            let (path, bytes) = (stream.file().path().to_path_buf(), stream.file().bytes());
+            let is_saved = stream.first_cycle() < self.unsaved_cycle;
+            drop(stream);
+            if is_saved {
+                self.ended_bytes += bytes;
+            } else {
+                // Memory still holds everything in this file.
+                let _ = fs::remove_file(&path);
+                self.files -= 1;
+            }
         }
-        let Some(stream) = self.stream.take() else { return };
-        let (path, bytes) = (stream.file().path().to_path_buf(), stream.file().bytes());
-        let is_saved = stream.first_cycle() < self.unsaved_cycle;
-        drop(stream);
-        if is_saved {
-            self.ended_bytes += bytes;
-        } else {
-            // Memory still holds everything in this file.
-            let _ = fs::remove_file(&path);
+        if self.interruption.note() {
+            let free = self.interruption.free_text();
+            warn!(
+                "the recording is interrupted: {error}, with {free}; it goes on in a new file once there is room"
+            );
         }
     }
 }

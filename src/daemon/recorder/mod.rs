@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use self::continuous::Continuous;
 use self::folder::Folder;
+use self::interruption::Interruption;
 use self::replica::Replica;
 use self::tape::Tape;
 pub use self::windows::WindowOrder;
@@ -35,6 +36,7 @@ use hexad_client::realtime::usage::ThreadUsage;
 mod continuous;
 mod fault_watch;
 pub mod folder;
+pub mod interruption;
 mod replica;
 mod stream;
 mod tape;
@@ -103,6 +105,8 @@ pub struct RecorderLinks {
     pub cycles: SyncSender<Recorded>,
     /// Orders, from the control thread.
     pub orders: SyncSender<WindowOrder>,
+    /// Interruption of the recording, to the control thread.
+    pub interruption: Arc<Interruption>,
 }
 
 /// The recorder of a daemon.
@@ -145,18 +149,20 @@ impl<'a> Recorder<'a> {
         let context = Context { info, scene: Scene::new(&config.machine), rate: (rate_hz as u64).max(1) };
         let started_s = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |it| it.as_secs());
         let folder = |path: &PathBuf| Folder::new(path, &config.name, started_s, folders.bounds);
+        let interruption = Arc::new(Interruption::of(folders.record.clone().unwrap_or_default()));
+        let continuous = |path| Continuous::new(folder(path), interruption.clone());
         let recorder = Self {
             queue,
             memories,
             tape: Tape::new(rate_hz, controller.memory()),
             replica: Replica::new(controller.clone()),
             resume_cycle: 0,
-            recording: folders.record.as_ref().map(|path| Continuous::new(folder(path))),
+            recording: folders.record.as_ref().map(continuous),
             windows: Windows::new(folders.faults.as_ref().map(folder), context.rate, orders),
             report: RecorderReport::default(),
             context,
         };
-        (recorder, RecorderLinks { cycles, orders: order_sender })
+        (recorder, RecorderLinks { cycles, orders: order_sender, interruption })
     }
 
     /// Runs until the log thread has ended and everything is written.

@@ -12,7 +12,7 @@ use super::folder::Folder;
 use super::stream::Stream;
 use super::tape::Tape;
 use crate::recording::RecordingError;
-use crate::recording::file::RecordingFile;
+use crate::recording::file::{RecordingFile, remove_if_empty};
 use hexad_client::messages::CycleMessage;
 
 /// Cycles of a window written in one step: a millisecond of effort.
@@ -171,6 +171,7 @@ impl Window {
     /// Completes the file, and reports the result to the operator or the log.
     fn conclude(self, written: Result<(), RecordingError>) {
         let Self { stream, cycles, answer, .. } = self;
+        let path = stream.file().path().to_path_buf();
         let result = written.and_then(|()| stream.finish());
         match answer {
             // The receiver is gone if the client has left.
@@ -179,7 +180,10 @@ impl Window {
             }
             None => match result {
                 Ok(path) => info!("the cycles around the fault are in {}", path.display()),
-                Err(error) => warn!("the cycles around the fault are lost: {error}"),
+                Err(error) => {
+                    let _ = remove_if_empty(&path);
+                    warn!("the cycles around the fault are lost: {error}");
+                }
             },
         }
     }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, WriteOptions, Writer};
 
+use super::reader::Recording;
 use super::scene::Scene;
 use super::{CYCLE, FRAMES, GAP, JOINTS, MEMORY, RecordingError, RunInfo, schema};
 use hexad_client::messages::cdr::CdrWriter;
@@ -73,12 +74,14 @@ pub struct RecordingFile {
 }
 
 impl RecordingFile {
-    /// Creates a file. `fault` is the cycle of the fault whose window it holds.
+    /// Creates a file. `fault` is the cycle of the fault whose window it holds. If not even its head can be
+    /// written, no file is left.
     pub fn create(path: &Path, info: &RunInfo, fault: Option<u64>) -> Result<Self, RecordingError> {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(FileError::on(folder))?;
         }
         Self::write_to(File::create(path).map_err(FileError::on(path))?, path, info, fault)
+            .inspect_err(|_| drop(fs::remove_file(path)))
     }
 
     /// Begins a recording in an open file, which messages call `path`.
@@ -177,6 +180,12 @@ impl RecordingFile {
         self.buffer = message;
         written.map_err(on(&self.path))
     }
+}
+
+/// Removes a recording that could not be completed, if no cycle can be read from it. Returns whether it did.
+pub fn remove_if_empty(path: &Path) -> bool {
+    let summary = Recording::open(path).and_then(|recording| recording.summary());
+    matches!(summary, Err(RecordingError::Empty(_))) && fs::remove_file(path).is_ok()
 }
 
 fn channels(writer: &mut Writer<File>) -> Result<Channels, McapError> {

@@ -202,6 +202,26 @@ impl Recording {
     }
 }
 
+/// Those of some recordings that have a cycle, with what they say about themselves. If there are several, the others are
+/// named on standard error. An error if none has a cycle.
+pub fn with_cycles(paths: &[PathBuf]) -> Result<Vec<(Recording, Summary)>, RecordingError> {
+    let (mut found, mut empty) = (vec![], None);
+    for path in paths {
+        let recording = Recording::open(path)?;
+        match recording.summary() {
+            // One without cycles because they are damaged is not left out.
+            Err(error @ RecordingError::Empty(_)) if recording.each_record(|_| Ok(()))?.damage.is_empty() => {
+                if paths.len() > 1 {
+                    remark(format_args!("{}: it is left out: no complete cycle is in it", path.display()));
+                }
+                empty.get_or_insert(error);
+            }
+            summary => found.push((recording, summary?)),
+        }
+    }
+    empty.filter(|_| found.is_empty()).map_or(Ok(found), Err)
+}
+
 /// The item of a message; `None` for topics that are only drawn.
 pub(super) fn item(topic: &str, message: &[u8]) -> Result<Option<Item>, String> {
     let is_hexad = [CYCLE, MEMORY, GAP].contains(&topic);

@@ -176,6 +176,32 @@ fn files_of_two_runs_are_refused() {
     assert!(!folder.path("report.html").exists());
 }
 
+/// What a full disk or a crash leaves is named, and hides nothing.
+#[test]
+fn files_without_a_cycle_are_left_out_and_one_with_damaged_cycles_is_not() {
+    let folder = machine();
+    folder.write("1.mcap", "");
+    write(&folder, "2.mcap", &folder.config(), 1, 1..1);
+    for refused in ["report -o @/report.html @/1.mcap @/2.mcap", "identify @/1.mcap @/2.mcap"] {
+        folder.refuses(refused, &["/1.mcap: no complete cycle is in it"]);
+    }
+    folder.refuses("convert @/1.mcap --csv @/1.csv", &["/1.mcap: no complete cycle is in it"]);
+    write(&folder, "3.mcap", &folder.config(), 1, 1..5);
+    let line = "report -o @/report.html @/1.mcap @/2.mcap @/3.mcap";
+    let (code, output, errors) = folder.run(line);
+    assert_eq!((code, errors.lines().count()), (Some(0), 2), "{errors}");
+    has(&output, &["4 cycles"]);
+    has(
+        &errors,
+        &["/1.mcap: it is left out: no complete cycle", "/2.mcap: it is left out: no complete cycle"],
+    );
+    let mut damaged = fs::read(folder.path("3.mcap")).unwrap();
+    let at = damaged.len() / 2;
+    damaged[at] ^= 1;
+    folder.write("4.mcap", damaged);
+    folder.refuses(&format!("{line} @/4.mcap"), &["/4.mcap: "]);
+}
+
 /// Files on both sides of two reloads, in any order, are one page that shows both.
 #[test]
 fn a_run_over_reloads_is_one_page() {

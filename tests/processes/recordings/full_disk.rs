@@ -1,6 +1,7 @@
 //! A disk that is full for a while interrupts the recording: it goes on in a new file, and no cycle is lost.
 
 use std::fs::{self, File};
+use std::io;
 use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::process::{self, Command};
@@ -10,12 +11,13 @@ use hexad::daemon::report::Report;
 use super::{about, arguments, read, replays_exactly};
 use crate::support::children::{Hexad, hexad};
 use crate::support::machine::Machine;
+use crate::support::socket::status;
 use crate::support::trio::start_plant;
 use hexad_support::not_run::lacking;
 
-/// A file system of 12 MiB, most of it taken, for the command that follows the folder. Nobody else sees it.
+/// A file system of 40 MiB, most of it taken, for the command that follows the folder. Nobody else sees it.
 const ON_SMALL_DISK: &str =
-    "mount -t tmpfs -o size=12m none \"$0\" && head -c 9437184 /dev/zero > \"$0\"/ballast && exec \"$@\"";
+    "mount -t tmpfs -o size=40m none \"$0\" && head -c 38797312 /dev/zero > \"$0\"/ballast && exec \"$@\"";
 
 /// `unshare` with what this user needs to mount; `None` where that is not possible.
 fn unshare() -> Option<Vec<&'static str>> {
@@ -60,12 +62,27 @@ fn a_full_disk_interrupts_the_recording_and_no_cycle_is_lost() {
     let disk = PathBuf::from(format!("/proc/{}/fd/{}", process::id(), disk.as_raw_fd()));
     daemon.says("the recording is interrupted: ");
     daemon.must_run();
+    // Now there is no room for a head either. An open file would keep its room.
+    let mut ballast = File::options().append(true).open(disk.join("ballast")).unwrap();
+    io::copy(&mut io::repeat(0), &mut ballast).unwrap_err();
+    drop(ballast);
     let before = recordings(&disk);
+    let warnings = || status(&machine)["status"]["warnings"].to_string();
+    let begin = format!("[\"the recording in {} has been interrupted for ", record.display());
+    let lasted_s = || warnings().strip_prefix(&begin)?.split_once(" s, with 0.0 MiB free: ")?.0.parse().ok();
+    daemon.waits(
+        || lasted_s().is_some_and(|lasted_s: u32| lasted_s >= 7),
+        "warn of 7 s, in which it has retried",
+    );
+    // Another one may be about to be removed.
+    assert!(recordings(&disk).len() <= before.len() + 1, "{:?}", recordings(&disk));
     fs::remove_file(disk.join("ballast")).unwrap();
-    daemon.says("the recording goes on in ");
+    daemon.says(" s nothing was written unwritten=0");
+    assert_eq!(warnings(), "[]");
     let said = daemon.stops();
     plant.stops();
     assert_eq!(said.matches("the recording is interrupted: ").count(), 1, "{said}");
+    assert!(said.contains("the recording goes on in "), "{said}");
     assert!(said.contains("No space left on device") && said.contains("once there is room"), "{said}");
 
     let after = recordings(&disk);

@@ -129,7 +129,8 @@ impl Hexad {
         }
     }
 
-    fn waits(&self, is_so: impl Fn() -> bool, what: &str) {
+    /// Waits until something is so.
+    pub fn waits(&self, is_so: impl Fn() -> bool, what: &str) {
         let start = Instant::now();
         while !is_so() {
             assert!(start.elapsed() < HANG, "{} must {what}, and said:\n{}", self.command, self.words());
