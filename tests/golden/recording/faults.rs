@@ -14,6 +14,7 @@ pub const SCRIPTS: &[Script] = &[
     ("measurements_wrong", "reference", "[drive]\ndelay_us = 100.0", measurements_wrong),
     ("measurements_implausible", "fried2008", "[measured]\nlength_step_m = 1e-7", measurements_implausible),
     ("drives_and_external_poses", "fried2008", "[drive]\nready_timeout_ms = 40.0", drives_and_external_poses),
+    ("bus_of_drives_fails", "tabletop", "", bus_of_drives_fails),
     ("stamps_release_the_cycles", "tsai2000", EXTERNAL, stamps),
     ("payload_and_impacts", "motion_base", IMPERFECT, payload_and_impacts),
     ("weak_feedback", "scattered", WEAK, weak_feedback),
@@ -121,6 +122,21 @@ fn drives_and_external_poses(recorder: &mut Recorder) {
     recorder.ask(Request::Engage);
     recorder.run_with(60, |m| m.measured().drives.enabled = Some(0));
     recorder.always = |m| m.measured().drives.fault = Some(0);
+    recorder.engage();
+    recorder.go(MOVES, 0.3);
+}
+
+fn bus_of_drives_fails(recorder: &mut Recorder) {
+    recorder.always = report;
+    let faults: &[Fault] = &[
+        (14, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED)),
+        (1, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED | 8)),
+        (30, |m| {
+            m.measured().drives.fault = Some(DriveStatus::BUS_FAILED);
+            m.measured().length = [f64::NAN; LEGS];
+        }),
+    ];
+    each_in_motion(recorder, faults);
     recorder.engage();
     recorder.go(MOVES, 0.3);
 }
