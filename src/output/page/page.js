@@ -34,14 +34,14 @@ function showAll() {
   if (!isFollowed) setRange(0, HEAD.length_s);
 }
 
-// Time of day of an instant of a recording, as in the log.
+// Time of day of an instant of a recording, as in the log; empty on other pages.
 function clock(t) {
-  return new Date(1000 * (HEAD.begin_s + t)).toISOString().slice(11, 23);
+  return HEAD.begin_s > 0 ? `${new Date(1000 * (HEAD.begin_s + t)).toISOString().slice(11, 23)} UTC` : "";
 }
 
 function setTime(t) {
   now = t;
-  byId("now").textContent = `${t.toFixed(4)} s${HEAD.is_live ? "" : `, ${clock(t)} UTC`}`;
+  byId("now").textContent = [`${t.toFixed(4)} s`, clock(t)].filter(Boolean).join(", ");
   moveCursors(t);
   instantChanged(t);
 }

@@ -117,7 +117,7 @@ function firstFault() {
 
 function fillList() {
   const table = document.getElementById("intervals");
-  table.replaceChildren(element("tr", {}, ...["from [s]", "to [s]", HEAD.is_live ? "" : "from [UTC]", "", ""].map((text) => element("th", { textContent: text }))));
+  table.replaceChildren(element("tr", {}, ...["from [s]", "to [s]", "", "", ""].map((text) => element("th", { textContent: text }))));
   const all = tracks.flatMap((track) => track.intervals.map((interval) => ({ track, interval })));
   all.sort((a, b) => a.interval.from - b.interval.from);
   for (const { track, interval } of all.slice(0, LIST_ROWS)) {
@@ -127,7 +127,7 @@ function fillList() {
       setRange(interval.from - border, interval.to + border);
       setTime(interval.from);
     });
-    const cells = [element("td", {}, button), interval.to.toFixed(3), HEAD.is_live ? "" : clock(interval.from), track.name, interval.text];
+    const cells = [element("td", {}, button), interval.to.toFixed(3), clock(interval.from), track.name, interval.text];
     table.append(element("tr", {}, cells[0], ...cells.slice(1).map((text) => element("td", { textContent: text }))));
   }
   if (all.length > LIST_ROWS) {
