@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(add(message(5, 110), 9010), Ok(()));
         // Of the same life, while it is followed and afterwards; of an earlier life.
         assert_eq!(add(message(5, 100), 9020), Err(Rejection::Clock(NoInstant::Late(100.0))));
-        assert_eq!(add(message(5, 110), 9500), Err(Rejection::Clock(NoInstant::Late(100.0))));
+        assert_eq!(add(message(5, 110), 9500), Err(Rejection::Clock(NoInstant::Repeated)));
         assert_eq!(add(message(4, 999), 9500), Err(Rejection::PastEpoch(4, 5)));
         assert_eq!(add(message(6, 1), 9500), Ok(()));
         let target = SetpointMessage { kind: 2, ..message(6, 2) };
