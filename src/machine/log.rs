@@ -57,7 +57,7 @@ pub fn install_without(libraries: &[&str], format: LogFormat) -> Log {
     Log
 }
 
-/// The same without those of a library, beside a layer that receives them.
+/// The same without the events of a library, beside a layer that receives them.
 pub fn install_beside(format: LogFormat, library: &str, layer: impl Layer<Registry> + Send + Sync) -> Log {
     let (filter, warning) = filter(&[library]);
     registry().with(layer).with(output_layer(format).with_filter(filter)).init();

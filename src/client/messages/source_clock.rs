@@ -37,7 +37,7 @@ pub enum NoInstant {
     Measured,
     /// Two messages of one stamp.
     #[error(
-        "its stamp is that of the message before: stamp each, or let setpoint.clock = \"arrival\" in the machine file take their arrivals"
+        "its stamp repeats the last one: stamp each message, or set setpoint.clock = \"arrival\" in the machine file"
     )]
     Repeated,
     /// Late, or older than the newest.
@@ -138,7 +138,7 @@ impl SourceClock {
             ClockRule::RealTime => Line::new(1.0, REAL_TIME_DRIFT),
             _ => Line::new(rate, MEASURED_DRIFT),
         };
-        // The least delay is that of all messages which were measured.
+        // The measured messages give the least delay.
         for [stamp_ns, arrival_ns] in core::mem::take(&mut self.measured) {
             let _ = line.instant(stamp_ns, arrival_ns, i64::MAX);
         }
@@ -146,13 +146,13 @@ impl SourceClock {
         self.line.insert(line).instant(stamp_ns, arrival_ns, self.max_age_ns)
     }
 
-    /// Whether a source with this rate is followed from now on. While its stamps go on, another rate is that of a queue.
+    /// Whether a source with this rate is followed from now on. While its stamps go on, a queue explains another rate.
     fn may_follow(&self, rate: f64) -> bool {
         let before = self.rate_before();
         self.restarts && before.map_or(RATES.contains(&rate), |before| SAME.contains(&(rate / before)))
     }
 
-    /// The rate that a source of any rate had, if its stamps go on, and that of real time.
+    /// The rate before: of a source whose stamps go on, or of real time.
     fn rate_before(&self) -> Option<f64> {
         let line = self.line.as_ref()?;
         let goes_on = self.measured.first().is_some_and(|[stamp_ns, _]| line.newest_ns <= Some(*stamp_ns));

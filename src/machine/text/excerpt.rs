@@ -23,7 +23,7 @@ pub fn excerpt_of_length(text: &str, max_shown: usize) -> String {
     shown
 }
 
-/// Characters that are not ASCII, and those of numbers and keys for which they are taken.
+/// Characters outside ASCII, and the characters of numbers and keys that they look like.
 const LIKENESSES: [(&str, &str); 6] = [
     ("\u{2010}\u{2011}\u{2012}\u{2013}\u{2014}\u{2212}\u{fe63}\u{ff0d}", "'-'"),
     ("\u{2018}\u{2019}\u{2032}", "\"'\""),

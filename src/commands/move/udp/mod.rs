@@ -354,7 +354,7 @@ mod tests {
         }
         let (_, x) = receiver.newest().unwrap();
         assert!((x[3] - config.machine.home[3] - 1e-3).abs() < 1e-12);
-        let told = receiver.description();
-        assert!(told.starts_with("1 datagrams accepted; 1 rejected: it has 3 fields"), "{told}");
+        let text = receiver.description();
+        assert!(text.starts_with("1 datagrams accepted; 1 rejected: it has 3 fields"), "{text}");
     }
 }

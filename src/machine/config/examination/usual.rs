@@ -1,6 +1,6 @@
 //! Examination of values by ratios that are alike for machines of every size: a wrong unit shows in them.
 //!
-//! The bounds are those of the machines that we know, from a piezo stage of 0.1 mm to a motion base of 20 kN, with room beyond. What
+//! The bounds come from known machines, from a piezo stage of 0.1 mm to a motion base of 20 kN, with room beyond. What
 //! they cannot know: docs/operator.md.
 
 use core::ops::RangeInclusive;
@@ -204,7 +204,7 @@ fn pair_ratios(examiner: &Examiner) -> Vec<Ratio> {
         control.following_velocity_rad_s / angular.velocity,
     ];
     let jerk = [linear, angular].map(|bound| bound.jerk / bound.acceleration);
-    const ANGLES: &str = "that of the rotation, at the radius of the joints";
+    const ANGLES: &str = "the value of the rotation, at the radius of the joints";
     const IN_A_SECOND: &str = "the acceleration in a second";
     let rows = [
         (["limits.velocity_m_s", "limits.velocity_rad_s"], velocity, ANGLES, 0.08..=12.0),
