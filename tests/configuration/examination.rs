@@ -326,11 +326,13 @@ fn legs_that_share_a_joint_do_not_cross() {
 }
 
 #[test]
-fn gravity_that_does_not_press_the_platform_onto_its_legs_is_warned_of() {
+fn gravity_across_the_legs_or_not_of_the_earth_is_warned_of() {
     for (gravity, words) in [
         ("[0.0, 0.0, 9.81]", Some("the platform hangs")),
         ("[9.81, 0.0, 0.0]", Some("is across")),
         ("[3.0, 0.0, -9.34]", None),
+        ("[0.0, 0.0, -1.0]", Some("on the Earth")),
+        ("[0.0, 0.0, -32.2]", Some("on the Earth")),
         ("[0.0, 0.0, 0.0]", None),
     ] {
         let found =
