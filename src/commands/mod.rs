@@ -31,6 +31,7 @@ use self::recover::RecoverArguments;
 use self::replay::ReplayArguments;
 use self::report::ReportArguments;
 use self::request::{EngageArguments, RequestArguments, StopArguments};
+use self::ride::RideArguments;
 use self::run::RunArguments;
 use self::status::StatusArguments;
 use self::view::ViewArguments;
@@ -74,6 +75,7 @@ mod recover;
 mod replay;
 mod report;
 mod request;
+mod ride;
 mod run;
 pub mod status;
 mod view;
@@ -104,6 +106,8 @@ enum CommandArguments {
     Goto(GotoArguments),
     /// Keep the platform under control where it is, until Ctrl-C; then stop
     Hold(HoldArguments),
+    /// Begin or end a ride that a stream of poses moves (move --udp)
+    Ride(RideArguments),
     /// Move the platform by keys on a terminal, while they are held
     Jog(JogArguments),
     /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
@@ -178,6 +182,7 @@ impl CommandLine {
             Is::Move(arguments) => arguments.execute(),
             Is::Excite(arguments) => arguments.execute(),
             Is::Goto(arguments) => arguments.execute(),
+            Is::Ride(arguments) => arguments.execute(),
             Is::Hold(arguments) => arguments.execute(),
             Is::Jog(arguments) => arguments.execute(),
             Is::Demo(arguments) => arguments.execute(),

@@ -4,6 +4,9 @@ use std::io::Write;
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant};
 use std::{env, fs};
 
@@ -12,7 +15,7 @@ use hexad::messages::clock::monotonic_ns;
 
 use crate::support::children::{Hexad, hexad};
 use crate::support::machine::{Machine, patient};
-use crate::support::socket::{pose, state, status};
+use crate::support::socket::{pose, state, status, stops};
 use crate::support::trio::{Trio, let_pass, start_daemon};
 
 const GUIDE: &str = include_str!("../../docs/motion_simulator.md");
@@ -66,6 +69,13 @@ fn deviation(measured: &[MeasuredMessage], began_ns: u64, [from_ns, to_ns]: [u64
     lags.map(|lag| [rms(lag), lag]).min_by(|a, b| a[0].total_cmp(&b[0])).unwrap()
 }
 
+/// Of the guide, as this test uses it.
+const SHOWN: [&str; 3] = [
+    "hexad move --config F --udp 127.0.0.1:4123 --format game.toml --engage",
+    "hexad ride start --config F",
+    "--boarding 0,0,0,1.08m,0,0",
+];
+
 /// What happened in a ride: pauses that the player saw, and largest RMS deviation from the flight \[m\].
 struct Ride {
     pauses: usize,
@@ -82,20 +92,21 @@ fn ride() -> Ride {
     // A free port, which the player binds next.
     let to = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     let format = machine.path("game.toml").display().to_string();
-    let shown =
-        "hexad move --config F --udp 127.0.0.1:4123 --format game.toml --boarding 0,0,0,1.08m,0,0 --engage";
-    assert!(GUIDE.contains(shown));
+    SHOWN.iter().for_each(|shown| assert!(GUIDE.contains(shown), "{shown}"));
     let line = ["--udp", &to, "--format", &format, "--boarding", "0,0,0,1.08m,0,0", "--engage"];
     let player = Hexad::start(&machine, "move", &line);
     daemon.says("active");
-    player.says("waits for datagrams");
+    player.says("stands at the boarding pose");
     let (began, began_ns) = (Instant::now(), monotonic_ns());
     let pose = |when: &str| -> [f64; 6] {
         assert_eq!(state(&machine), "active", "{when}");
         pose(&machine)
     };
+    send(&socket, &to, began, 3.0, false);
+    assert!((pose("before the ride")[3] - 1.08).abs() < 1e-3);
+    let start = Hexad::start(&machine, "ride", &["start"]);
     send(&socket, &to, began, 1.0, false);
-    player.says("follows the stream");
+    assert_eq!(start.ends().succeeds(), "riding\n");
     socket.send_to(b"1;2", &to).unwrap();
     let first = send(&socket, &to, began, 6.0, false);
     let_pass(Duration::from_secs(2));
@@ -155,6 +166,164 @@ fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
     let undisturbed = (0..3).map(|_| ride()).find(|ride| ride.pauses == 1);
     let ride = undisturbed.expect("three rides with a single pause in none of them");
     assert!(ride.deviation_m < 4e-3, "{} m", ride.deviation_m);
+}
+
+/// A program that sends datagrams, from a port of its own, until it is dropped.
+struct Game {
+    sends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Game {
+    /// `scale`: of its lengths and angles, as if they had other units.
+    fn start(to: &str, scale: f64) -> Self {
+        let (sends, to) = (Arc::new(AtomicBool::new(true)), to.to_owned());
+        let (goes_on, socket) = (sends.clone(), UdpSocket::bind("127.0.0.1:0").unwrap());
+        let thread = spawn(move || {
+            let began = Instant::now();
+            while goes_on.load(Ordering::Relaxed) {
+                let t = began.elapsed().as_secs_f64();
+                let [y, gamma] = flight(t).map(|coordinate| scale * coordinate);
+                let line = format!("{:.3};0;{:.4};0;0;0;{:.4}\n", 1e3 * t + 5e5, 1e3 * y, gamma.to_degrees());
+                socket.send_to(line.as_bytes(), &to).unwrap();
+                std::thread::sleep(Duration::from_millis(16));
+            }
+        });
+        Self { sends, thread: Some(thread) }
+    }
+}
+
+impl Drop for Game {
+    fn drop(&mut self) {
+        self.sends.store(false, Ordering::Relaxed);
+        self.thread.take().into_iter().for_each(|thread| thread.join().unwrap());
+    }
+}
+
+/// A machine, its player at the boarding pose, and the operator.
+struct Operator {
+    machine: Machine,
+    to: String,
+}
+
+impl Operator {
+    fn player(&self) -> Hexad {
+        let format = self.machine.path("game.toml").display().to_string();
+        let line = ["--udp", &self.to, "--format", &format, "--boarding", "0,0,0,1.1m,0,0", "--engage"];
+        let player = Hexad::start(&self.machine, "move", &line);
+        self.boards(&player);
+        player
+    }
+
+    fn boards(&self, player: &Hexad) {
+        let phase = || status(&self.machine)["status"]["sources"][0]["processes"][0]["ride"].clone();
+        player.waits(|| phase() == "ready", "board");
+        self.stands();
+    }
+
+    /// `hexad ride ORDER`, which must end so.
+    fn orders(&self, line: &[&str], words: &str) {
+        let ended = self.machine.hexad("ride", line);
+        let code = ended.status.code();
+        let text = ended.stdout + &ended.stderr;
+        assert!(text.contains(words), "{line:?} {code:?}: {text}");
+    }
+
+    fn stands(&self) {
+        let_pass(Duration::from_millis(400));
+        let x = pose(&self.machine);
+        assert!((x[3] - 1.1).abs() < 2e-4 && x[4].abs() < 2e-4, "{x:?}");
+    }
+}
+
+#[test]
+#[apply(beside_others)]
+fn a_dry_run_shows_a_stream_and_what_the_limits_change_and_names_wrong_units() {
+    let machine = Machine::with("dry", block(1));
+    fs::write(machine.path("game.toml"), block(2)).unwrap();
+    let to = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let format = machine.path("game.toml").display().to_string();
+    let picture = machine.path("stream.svg").display().to_string();
+    let of_scale = |scale: f64, seconds: &str| {
+        let _game = (scale > 0.0).then(|| Game::start(&to, scale));
+        let line =
+            ["--udp", &to, "--format", &format, "--dry-run", "--seconds", seconds, "--output", &picture];
+        machine.hexad("move", &line)
+    };
+    of_scale(0.0, "0.2").fails(1, "no datagram has arrived: the program does not send");
+    assert!(!fs::exists(&picture).unwrap());
+    let text = of_scale(1.0, "1").succeeds();
+    for words in ["datagrams accepted", "% missing", "lowest", "the platform would follow within"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert!(fs::read_to_string(&picture).unwrap().contains("</svg>"));
+    of_scale(1e3 / 57.0, "0.5").fails(1, "do its units, or its scale, differ from its format?");
+}
+
+/// Never the stream: not at first, nor after an order that nobody waits for, a stop, or a new start of the game or of the source.
+#[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
+fn only_the_operator_begins_a_ride() {
+    let machine = Machine::with("ride", block(1));
+    fs::write(&machine.file, patient(&fs::read_to_string(&machine.file).unwrap())).unwrap();
+    fs::write(machine.path("game.toml"), block(2)).unwrap();
+    let Trio { daemon, plant, machine, recorder, .. } = Trio::standing(machine);
+    let to = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let operator = Operator { machine, to };
+    operator.orders(&["start"], "no hexad move --udp moves this machine");
+    let player = operator.player();
+    operator.orders(&["start", "--within", "0.3"], "no stream has come in time (no datagram has arrived)");
+    let gone = Hexad::start(&operator.machine, "ride", &["start"]);
+    daemon.waits(|| daemon.words().matches("request: ride_start").count() == 3, "receive the order");
+    gone.signal("INT");
+    gone.ends().fails(1, "interrupted");
+    let wrong = Game::start(&operator.to, 1e3 / 57.0);
+    let_pass(Duration::from_secs(3));
+    operator.stands();
+    operator.orders(&["start"], "do its units, or its scale, differ from its format?");
+    drop(wrong);
+    // Another stream is judged anew from the boarding pose on.
+    player.signal("INT");
+    player.ends();
+    let player = operator.player();
+    let mut game = Game::start(&operator.to, 1.0);
+    operator.orders(&["end"], "no ride is in progress");
+    for begin in ["pause", "end", "new game", "stop"] {
+        operator.orders(&["start"], "riding");
+        operator.orders(&["start"], "the ride has begun already");
+        match begin {
+            "pause" => {
+                operator.machine.hexad("move", &["--pause"]).succeeds();
+                operator.orders(&["start"], "hexad move --resume goes on");
+                operator.machine.hexad("move", &["--resume"]).succeeds();
+                let ridings = || player.words().matches("follows the stream").count();
+                player.waits(|| ridings() == 2, "go on");
+                operator.orders(&["end"], "boarding");
+            }
+            "end" => operator.orders(&["end"], "boarding"),
+            "new game" => {
+                drop(game);
+                let_pass(Duration::from_millis(800));
+                game = Game::start(&operator.to, 1.0);
+                player.says("the program that sends has started again");
+            }
+            _ => assert!(stops(&operator.machine, "stop", &["standby"])),
+        }
+        if begin != "stop" {
+            operator.boards(&player);
+        }
+    }
+    player.ends().fails(1, "control has ended");
+    let player = operator.player();
+    let_pass(Duration::from_secs(3));
+    operator.stands();
+    drop(game);
+    player.signal("INT");
+    player.ends();
+    daemon.stops();
+    plant.stops();
+    drop(recorder);
 }
 
 /// A button that is pressed, and one that is unplugged.

@@ -89,6 +89,8 @@ pub struct SourceClock {
     max_age_ns: i64,
     /// Whether another life of the source begins without notice.
     restarts: bool,
+    /// Lives of the source so far.
+    lives: u32,
     line: Option<Line>,
     /// Stamps and arrivals of messages without an instant \[ns\].
     measured: Vec<[i64; 2]>,
@@ -101,6 +103,7 @@ impl SourceClock {
             rule,
             max_age_ns,
             restarts: restarts || rule == ClockRule::AnyRate,
+            lives: 0,
             line: None,
             measured: vec![],
         }
@@ -109,6 +112,11 @@ impl SourceClock {
     /// Seconds of its clock in a second, once it is known.
     pub fn rate(&self) -> Option<f64> {
         self.line.as_ref().map(|line| line.rate)
+    }
+
+    /// How often the source, or its clock, has begun.
+    pub fn lives(&self) -> u32 {
+        self.lives
     }
 
     /// Instant of a stamp.
@@ -143,6 +151,7 @@ impl SourceClock {
             let _ = line.instant(stamp_ns, arrival_ns, i64::MAX);
         }
         line.newest_ns = None;
+        self.lives += 1;
         self.line.insert(line).instant(stamp_ns, arrival_ns, self.max_age_ns)
     }
 

@@ -19,6 +19,7 @@ mod exchange;
 pub mod motion_fields;
 pub mod protocol;
 pub mod requests;
+pub mod ride;
 pub mod signal;
 pub mod status_report;
 pub mod stops;

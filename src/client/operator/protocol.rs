@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::motion_fields::{FrameField, RateFields, TargetFields};
+use super::ride::RidePhase;
 use super::status_report::{StatusReport, StopNumber};
 use hexad_core::control::signals::state::Request;
 
@@ -23,7 +24,7 @@ const DEFAULT_WITHIN_S: f64 = 30.0;
 pub struct RequestLine {
     /// Version of the protocol.
     pub version: u32,
-    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status`, `record`, `goto`, `hold` or `jog`.
+    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status`, `record`, `goto`, `hold`, `jog`, `ride_start` or `ride_end`.
     pub request: String,
     /// Number by which the client knows the answer: each line about this request repeats it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -56,6 +57,12 @@ pub struct RequestLine {
     /// With `status`: what the client, if it publishes setpoints, says of its own input. Reports repeat it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
+    /// The same of its ride.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ride: Option<RidePhase>,
+    /// With `ride_start`: whether a stream that looks wrong is followed all the same.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub yes: bool,
     /// Whether a motion takes control, if the platform is not under control. `within_s` bounds the wait for it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub engage: bool,

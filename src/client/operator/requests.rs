@@ -8,6 +8,7 @@ use super::connection::{Attempt, Connection};
 use super::endpoint::{Endpoint, endpoints};
 use super::exchange::converse;
 use super::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use super::ride::{RideOrder, RidePhase};
 use super::status_report::StopNumber;
 use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
 use crate::messages::MAX_REQUEST_AGE_NS;
@@ -72,9 +73,13 @@ pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
     first_answer(machine, status_of)
 }
 
-/// The same, for a source of setpoints that says something of its own input.
-pub fn status_for_source(machine: &str, input: Option<String>) -> Result<AnswerLine, OperatorError> {
-    let line = RequestLine { input, ..RequestLine::new("status") };
+/// The same, for a source of setpoints that says something of its own input, and of its ride.
+pub fn status_for_source(
+    machine: &str,
+    input: Option<String>,
+    ride: Option<RidePhase>,
+) -> Result<AnswerLine, OperatorError> {
+    let line = RequestLine { input, ride, ..RequestLine::new("status") };
     first_answer(machine, |endpoint| status_at(endpoint, &line))
 }
 
@@ -88,6 +93,22 @@ fn status_at(endpoint: &Endpoint, line: &RequestLine) -> Result<AnswerLine, Oper
         let until = Instant::now() + FIRST_LINE_LIMIT;
         converse(&mut connection, line, until, FIRST_LINE_LIMIT, || false, |_| ())
     })
+}
+
+/// Sends a request about a ride, and waits for its answer. It is withdrawn if `interrupted`.
+pub fn ride(
+    machine: &str,
+    order: RideOrder,
+    yes: bool,
+    within: Duration,
+    interrupted: impl Fn() -> bool,
+) -> Result<AnswerLine, OperatorError> {
+    let (stops, within_s) = (stop_number(machine), within.as_secs_f64());
+    let line = RequestLine { stops, yes, within_s, progress: true, ..RequestLine::new(order.name()) };
+    let answer = ask_first(machine, |connection| {
+        converse(connection, &line, Instant::now() + FIRST_LINE_LIMIT, within, &interrupted, |_| ())
+    });
+    if interrupted() { Err(OperatorError::Interrupted) } else { answer }
 }
 
 /// Requests a reload of the machine file. Returns the changes as text.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::ride::{RideOrder, RidePhase};
+
 /// State of the daemon, its machine and its topics, in SI units and radians.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatusReport {
@@ -152,4 +154,10 @@ pub struct ProcessReport {
     /// What it says of its own input, as of datagrams that it did not follow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
+    /// What it does, if persons ride.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ride: Option<RidePhase>,
+    /// What the operator wants of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ride_order: Option<RideOrder>,
 }

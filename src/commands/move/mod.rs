@@ -68,8 +68,8 @@ pub struct MoveArguments {
     group: Option<String>,
     #[command(flatten)]
     frames: FrameOptions,
-    /// Length of the motion [s]
-    #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with_all = ["trajectory", "udp"])]
+    /// Length of the motion, or of --dry-run [s]
+    #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
     #[command(flatten)]
     playback: PlaybackOptions,
@@ -142,6 +142,9 @@ impl MoveArguments {
         }
         if let Some(address) = self.source.udp {
             let stop = Stop::on_signals()?;
+            if self.stream.dry_run {
+                return Ok(udp::dry_run::run(&config, address, &self.stream, self.seconds, &stop)?);
+            }
             return Ok(udp::follow(&config, address, &self.stream, &self.playback, &stop)?);
         }
         let coordinates = self.frames.coordinates(&config)?;

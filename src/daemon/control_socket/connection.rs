@@ -11,6 +11,7 @@ use tracing::{info, warn};
 use super::answer::OpenRequest;
 use super::last_seconds::LastSeconds;
 use super::order::PendingOrder;
+use super::ride::PendingRide;
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
 use hexad_client::operator::users::user_name;
 use hexad_client::realtime::file_passing;
@@ -87,6 +88,8 @@ pub struct Connection {
     pub reload: Option<(OpenRequest, u64)>,
     /// The recording of the last seconds in progress.
     pub last_seconds: Option<(OpenRequest, LastSeconds)>,
+    /// The order for a ride in progress.
+    pub ride: Option<(OpenRequest, PendingRide)>,
     /// The last file that the client passed.
     pub file: Option<File>,
     /// Number of the connection.
@@ -125,6 +128,7 @@ impl Connection {
             line: None,
             reload: None,
             last_seconds: None,
+            ride: None,
             file: None,
             id,
             waits_for_motion: false,
@@ -138,8 +142,8 @@ impl Connection {
 
     /// Whether the client waits for an answer.
     pub fn is_waiting(&self) -> bool {
-        let Self { pending, line, reload, last_seconds, waits_for_motion, .. } = self;
-        let waits = pending.is_some() || reload.is_some() || last_seconds.is_some();
+        let Self { pending, line, reload, last_seconds, ride, waits_for_motion, .. } = self;
+        let waits = pending.is_some() || reload.is_some() || last_seconds.is_some() || ride.is_some();
         waits || line.is_some() || *waits_for_motion
     }
 

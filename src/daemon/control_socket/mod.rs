@@ -44,6 +44,7 @@ mod motion;
 mod order;
 mod reload;
 mod respond;
+mod ride;
 pub mod status;
 
 /// Largest number of connections. One more closes the first in the order of [`Connection::rank`].
@@ -109,6 +110,7 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         server.make_room();
         server.advance();
         server.advance_motion();
+        server.advance_rides();
         server.answer_reloads();
         server.log_rejections();
     }

@@ -15,6 +15,7 @@ use crate::motion_requests::order::MotionOrder;
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG};
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use hexad_client::operator::ride::RideOrder;
 use hexad_client::operator::status_report::StopNumber;
 use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::state::Request;
@@ -33,9 +34,7 @@ impl Server<'_> {
         if line.request == "status" {
             self.status.mover = self.motions.client(&self.connection_ids);
             self.status.stops = Some(self.stops());
-            if let Some(input) = &line.input {
-                self.status.set_input(connection.peer.process_id.cast_unsigned(), input);
-            }
+            self.status.describe_source(connection.peer.process_id.cast_unsigned(), line, self.woke_ns);
             let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
             return connection.answer(request, answer.clone());
@@ -46,9 +45,13 @@ impl Server<'_> {
                 RECORD => self.begin_recording(connection, request, line),
                 name if MotionOrder::is_named(name) => self.begin_motion(connection, request, line, snapshot),
                 other => {
+                    if let Some(order) = RideOrder::ALL.into_iter().find(|it| it.name() == other) {
+                        return self.begin_ride(connection, request, line, order, snapshot);
+                    }
                     let names = Request::ALL.map(Request::name).join(", ");
+                    let rides = RideOrder::ALL.map(RideOrder::name).join(", ");
                     let text = format!(
-                        "unknown request {other:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {names}"
+                        "unknown request {other:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {rides}, {names}"
                     );
                     connection.answer(request, AnswerLine::invalid(text))
                 }

@@ -14,7 +14,8 @@ use crate::snapshot::Snapshot;
 use crate::version::VERSION as BUILD;
 use hexad_client::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
 use hexad_client::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
-use hexad_client::operator::protocol::{AnswerLine, RequestResult, VERSION};
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, VERSION};
+use hexad_client::operator::ride::{RideOrder, RidePhase};
 use hexad_client::operator::status_report::{
     ConfigurationReport, LegReport, ProcessReport, SourceReport, StatusReport, StopNumber, TimingReport,
 };
@@ -28,6 +29,9 @@ use hexad_machine::text::excerpt::excerpt_of_length;
 
 /// Longest description of the input of a source, in characters.
 const MAX_INPUT: usize = 600;
+
+/// Longest time without a word of a source with a ride \[ns\].
+const MAX_SILENCE_NS: u64 = 1_000_000_000;
 
 /// Sources whose descriptions are kept.
 const MAX_INPUTS: usize = 16;
@@ -43,8 +47,18 @@ pub struct StatusSource {
     pub stops: Option<StopNumber>,
     /// Topics, opened at the first report; `None` if they cannot be opened: then the processes are unknown.
     topics: Option<Option<Topics>>,
-    /// What processes say of their input.
-    inputs: BTreeMap<u32, String>,
+    /// What processes say of themselves.
+    pub(super) inputs: BTreeMap<u32, SourceInput>,
+}
+
+/// What a source of setpoints says of itself, and what the operator wants of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SourceInput {
+    text: Option<String>,
+    ride: Option<RidePhase>,
+    pub(super) order: Option<RideOrder>,
+    /// Instant at which it said so \[ns\].
+    said_ns: u64,
 }
 
 struct Topics {
@@ -68,10 +82,33 @@ impl StatusSource {
         Self { loaded, reloads: 0, interruption, mover: None, stops: None, topics: None, inputs }
     }
 
-    /// Keeps what a process says of its input, for as long as it publishes setpoints.
-    pub fn set_input(&mut self, process_id: u32, input: &str) {
-        if self.inputs.len() < MAX_INPUTS || self.inputs.contains_key(&process_id) {
-            self.inputs.insert(process_id, excerpt_of_length(input, MAX_INPUT));
+    /// Keeps what a process says of itself with a request for the status, for as long as it publishes setpoints.
+    pub fn describe_source(&mut self, process_id: u32, line: &RequestLine, now_ns: u64) {
+        let says = line.input.is_some() || line.ride.is_some();
+        if says && (self.inputs.len() < MAX_INPUTS || self.inputs.contains_key(&process_id)) {
+            let source = self.inputs.entry(process_id).or_default();
+            (source.ride, source.said_ns) = (line.ride, now_ns);
+            source.text =
+                line.input.as_ref().map(|text| excerpt_of_length(text, MAX_INPUT)).or(source.text.take());
+        }
+    }
+
+    /// The source with a ride that has lately said its phase.
+    pub fn rider(&self, now_ns: u64) -> Option<(u32, RidePhase)> {
+        let is_new = |source: &SourceInput| now_ns.saturating_sub(source.said_ns) < MAX_SILENCE_NS;
+        let riders = self.inputs.iter().filter(|(_, source)| is_new(source));
+        riders.filter_map(|(process_id, source)| Some((*process_id, source.ride?))).next()
+    }
+
+    /// What a source says of its input.
+    pub fn input(&self, process_id: u32) -> &str {
+        self.inputs.get(&process_id).and_then(|source| source.text.as_deref()).unwrap_or_default()
+    }
+
+    /// The orders of operators for sources.
+    pub fn set_ride_orders(&mut self, orders: &[(u32, RideOrder)]) {
+        for (process_id, source) in &mut self.inputs {
+            source.order = orders.iter().find(|(id, _)| id == process_id).map(|(_, order)| *order);
         }
     }
 
@@ -226,16 +263,20 @@ fn process_report(
     publisher: u32,
     publishers: Publishers,
     mover: Option<u32>,
-    inputs: &BTreeMap<u32, String>,
+    inputs: &BTreeMap<u32, SourceInput>,
 ) -> ProcessReport {
     let process_id = mover.filter(|_| publisher == process::id()).unwrap_or(publisher);
     let user = fs::metadata(format!("/proc/{process_id}")).map(|found| user_name(found.uid()));
+    let SourceInput { text: input, ride, order: ride_order, .. } =
+        inputs.get(&publisher).cloned().unwrap_or_default();
     ProcessReport {
         process_id,
         command: command(process_id),
         user: user.unwrap_or_default(),
         is_ignored: publisher == publishers.ignored_pid,
-        input: inputs.get(&publisher).cloned(),
+        input,
+        ride,
+        ride_order,
     }
 }
 

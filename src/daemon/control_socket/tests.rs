@@ -10,6 +10,7 @@ use std::sync::mpsc::{channel, sync_channel};
 use super::*;
 use crate::motion_requests::job::{End, MotionEvent};
 use hexad_client::operator::protocol::RequestResult;
+use hexad_client::operator::ride::{RideOrder, RidePhase};
 use hexad_client::operator::status_report::StopNumber;
 use hexad_client::realtime::request_word::number;
 use hexad_client::realtime::triple_buffer::triple_buffer;
@@ -21,10 +22,32 @@ use hexad_machine::config::Config;
 static NOW_NS: AtomicU64 = AtomicU64::new(1_000_000_000);
 static NOBODY_ENDS: AtomicBool = AtomicBool::new(false);
 
-const KINDS: [&str; 15] = [
-    "engage", "engage", "engage", "engage", "engage", "goto", "goto", "hold", "park", "clear", "clear",
-    "stop", "off", "estop", "reload",
+const KINDS: [&str; 18] = [
+    "engage",
+    "engage",
+    "engage",
+    "engage",
+    "engage",
+    "goto",
+    "goto",
+    "hold",
+    "park",
+    "clear",
+    "clear",
+    "stop",
+    "off",
+    "estop",
+    "reload",
+    "ride_start",
+    "ride_start",
+    "ride_end",
 ];
+
+/// Requests that wait for another thread or process, whether their line says so or not.
+const WAITING: [&str; 3] = ["reload", "ride_start", "ride_end"];
+
+/// Process of the source of a ride.
+const RIDER: u32 = 7;
 
 /// What a client waits for.
 struct Open {
@@ -66,6 +89,8 @@ struct World {
     /// How often each result came, and how often control began.
     answers: BTreeMap<String, u64>,
     begun: u64,
+    phase: RidePhase,
+    rides: u64,
     random: Random,
 }
 
@@ -112,6 +137,8 @@ impl World {
             ids: 0,
             answers: BTreeMap::new(),
             begun: 0,
+            phase: RidePhase::Boarding,
+            rides: 0,
             random: Random::new(seed),
         };
         (0..3).for_each(|_| world.connect());
@@ -175,7 +202,9 @@ impl World {
             home: kind == "goto",
             ..RequestLine::new(kind)
         };
-        let due = self.step + if is_late { self.below(20) as u64 } else { 0 };
+        // A ride is long after its engage.
+        let latest = if kind == "ride_start" { 200 } else { 20 };
+        let due = self.step + if is_late { self.below(latest) as u64 } else { 0 };
         let asked = self.step;
         self.clients[client].later.push((due, line, asked));
     }
@@ -308,6 +337,31 @@ impl World {
         }
     }
 
+    /// The source of a ride. Who has left begins none.
+    fn ride(&mut self) {
+        let order = self.server.status.inputs.get(&RIDER).and_then(|source| source.order);
+        self.phase = match (self.phase, order) {
+            _ if self.state != State::Active => RidePhase::Boarding,
+            (RidePhase::Ready, Some(RideOrder::Start)) => {
+                let open = self.clients.iter().flat_map(|client| client.open.values());
+                let mut asked = open.filter(|open| open.kind == "ride_start");
+                let stopped = self.stopped;
+                assert!(
+                    asked.any(|open| open.asked.is_none_or(|asked| asked >= stopped)),
+                    "step {}",
+                    self.step
+                );
+                self.rides += 1;
+                RidePhase::Riding
+            }
+            (RidePhase::Riding, Some(RideOrder::End)) => RidePhase::Boarding,
+            (RidePhase::Boarding, _) => RidePhase::Ready,
+            (phase, _) => phase,
+        };
+        let line = RequestLine { ride: Some(self.phase), ..RequestLine::new("status") };
+        self.server.status.describe_source(RIDER, &line, NOW_NS.load(Ordering::Relaxed));
+    }
+
     /// A round of the control thread, and what its clients receive.
     fn round(&mut self) {
         self.server.poll(PollTimeout::ZERO);
@@ -323,6 +377,8 @@ impl World {
         }
         self.server.advance();
         self.server.advance_motion();
+        self.server.advance_rides();
+        self.ride();
         self.server.answer_reloads();
         for client in &mut self.clients {
             let mut line = String::new();
@@ -334,7 +390,7 @@ impl World {
                     continue;
                 };
                 let open = client.open.get(&id);
-                let is_on_the_way = open.is_none_or(|open| open.waits || open.kind == "reload");
+                let is_on_the_way = open.is_none_or(|open| open.waits || WAITING.contains(&open.kind));
                 if answer.result == RequestResult::Waiting
                     || answer.result == RequestResult::Accepted && is_on_the_way
                 {
@@ -372,11 +428,11 @@ fn search(seed: u64, runs: u64) {
             assert!(open.is_empty() && client.later.is_empty(), "run {run}: without an answer: {open:?}");
         }
     }
-    let World { answers, begun, .. } = world;
-    println!("{runs} orders of requests: control has begun {begun} times; {answers:?}");
+    let World { answers, begun, rides, .. } = world;
+    println!("{runs} orders of requests: control has begun {begun} times, rides {rides}; {answers:?}");
     let often = |result| answers.get(&format!("{result:?}")).is_some_and(|count| *count > runs / 4);
     let results = [RequestResult::Done, RequestResult::Superseded, RequestResult::Refused];
-    assert!(begun > runs / 4 && results.into_iter().all(often));
+    assert!(begun > runs / 4 && rides > runs / 40 && results.into_iter().all(often));
 }
 
 #[test]

@@ -1,30 +1,38 @@
 //! `hexad move --udp`: poses that a simulator or a game sends as datagrams.
 //!
 //! ```text
-//! boarding pose -> the stream is alive -> blend to it -> follow it -> a pause: stand -> blend to it ...
-//!                                                        Ctrl-C, or a long pause -> boarding pose
+//! boarding pose -> hexad ride start -> blend to the stream -> follow it -> a pause: stand -> blend to it ...
+//!       ^   hexad ride end, a long pause, another start of the game |
+//!       '-----------------------------------------------------------'    Ctrl-C -> boarding pose, end
 //! ```
+//!
+//! Only the operator begins a ride, never the stream: after a stop, a fault, or another start of the game or of this source, too.
 //!
 //! Datagrams are not authenticated: any program at an allowed address moves the platform, within the limits of the file.
 
 use std::io;
-use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::net::{IpAddr, SocketAddr};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use tracing::{info, warn};
+use tracing::info;
 
-use self::datagram_format::{Datagram, DatagramFormat, FormatError, MAX_BYTES};
-use self::rejection::{Rejection, RejectionCounts};
+use self::datagram_format::FormatError;
+use self::receiver::Receiver;
 use self::status_feed::StatusFeed;
+use self::survey::StreamSurvey;
 use super::PlaybackOptions;
 use crate::commands::failure::{CommandError, INTERRUPTED, default_exit_code};
 use crate::commands::quantity::{angle, length, list};
+use crate::output::svg::ChartError;
 use hexad_client::messages::Bus;
 use hexad_client::messages::clock::monotonic_ns;
-use hexad_client::messages::source_clock::SourceClock;
 use hexad_client::operator::requests::status;
+use hexad_client::operator::ride::{RideOrder, RidePhase};
+use hexad_client::realtime::pause_signals::PauseRequest;
 use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::constants::Constants;
 use hexad_core::control::parameters::ViolationPolicy;
 use hexad_core::model::task::pose_of;
 use hexad_core::motion::minimum_jerk::{rise, straight_move};
@@ -32,33 +40,29 @@ use hexad_daemon::constants;
 use hexad_daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
 use hexad_machine::analysis::target_motion::{TargetRefusal, check_target};
 use hexad_machine::config::Config;
+use hexad_machine::text::files::FileError;
+use hexad_machine::text::numbers::fixed;
 
 mod datagram_format;
+pub mod dry_run;
+mod receiver;
 mod rejection;
 mod status_feed;
-
-/// Longest time without datagrams before the platform comes to rest \[s\], if `timeouts.setpoint_ms` does not bound it.
-const PAUSE_S: f64 = 0.25;
-
-/// Share of `timeouts.setpoint_ms` after which a pause begins, so that the daemon never loses its source.
-const PAUSE_SHARE: f64 = 0.8;
-
-/// Datagrams without a pause that make a stream.
-const LIVELY: u32 = 10;
+mod survey;
 
 /// Duration of the blend from the pose at which the platform stands to the stream \[s\].
 const BLEND_S: f64 = 3.0;
 
+/// Share of the way from home to the lowest pose at which people board.
+const COMFORTABLE_SHARE: f64 = 0.9;
+
+/// Way below which nobody boards \[mm\].
+const LOWEST_MM: u32 = 3000;
+
 /// Pause after which the platform moves to the boarding pose \[s\].
 const LONG_PAUSE_S: f64 = 10.0;
 
-/// Time without any datagram after which the possible causes are named \[s\].
-const SILENCE_S: f64 = 10.0;
-
-/// Most datagrams that are read in one period.
-const DATAGRAMS: usize = 64;
-
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct StreamOptions {
     /// Format of the datagrams: x-plane, flypt-mover, simtools, or a file, see docs/motion_simulator.md
     #[arg(long, value_name = "NAME", requires = "udp")]
@@ -66,9 +70,15 @@ pub struct StreamOptions {
     /// Address from which datagrams are accepted; required unless --udp is of this host alone
     #[arg(long, value_name = "IP", requires = "udp")]
     from: Vec<IpAddr>,
-    /// Pose at which people board, with units, as in 0,0,0,0,0,0.7m; without it, home
+    /// Pose at which people board, with units, as in 0,0,0,0,0,0.7m; without it, home, lowered to nine tenths of what the machine permits
     #[arg(long, value_name = "X", requires = "udp", value_parser = boarding, allow_hyphen_values = true)]
     boarding: Option<[f64; 6]>,
+    /// Receive and examine the stream for --seconds; move nothing, and need no daemon
+    #[arg(long, requires = "udp", conflicts_with_all = ["engage", "boarding"])]
+    pub dry_run: bool,
+    /// SVG file for the picture of the stream
+    #[arg(long, value_name = "FILE", requires = "dry_run")]
+    output: Option<PathBuf>,
 }
 
 fn boarding(text: &str) -> Result<[f64; 6], String> {
@@ -90,6 +100,14 @@ pub enum StreamError {
     Socket(SocketAddr, io::Error),
     #[error("--udp: poses alone need setpoint.on_violation = \"limit\" in the machine file (now \"stop\")")]
     Policy,
+    #[error("signals of pause and resume: {0}")]
+    Signals(io::Error),
+    #[error("{0}")]
+    Silence(String),
+    #[error(transparent)]
+    Picture(#[from] ChartError),
+    #[error(transparent)]
+    Output(#[from] FileError),
     #[error(transparent)]
     Target(#[from] TargetError),
     #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
@@ -98,19 +116,23 @@ pub enum StreamError {
 
 impl CommandError for StreamError {
     fn has_begun(&self) -> bool {
-        matches!(self, Self::Target(error) if error.has_begun())
+        match self {
+            Self::Target(error) => error.has_begun(),
+            Self::Silence(_) | Self::Picture(_) | Self::Output(_) => true,
+            _ => false,
+        }
     }
 
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Target(error) => default_exit_code(error),
             Self::Interrupted => INTERRUPTED,
-            _ => 2,
+            _ => default_exit_code(self),
         }
     }
 }
 
-/// Follows the datagrams to an address until the first signal; then the platform moves to the boarding pose and stands there.
+/// Follows the datagrams to an address, each time that the operator begins a ride, until the first signal; then the platform moves to
+/// the boarding pose and stands there.
 pub fn follow(
     config: &Config,
     address: SocketAddr,
@@ -121,62 +143,127 @@ pub fn follow(
     if config.deployment.setpoint.on_violation != ViolationPolicy::Limit {
         return Err(StreamError::Policy);
     }
-    let mut receiver = Receiver::open(config, address, options)?;
-    let boarding = options.boarding.unwrap_or(config.machine.home);
-    let constants = constants(config);
+    let receiver = Receiver::open(config, address, options)?;
+    let (constants, pause) = (constants(config), PauseRequest::on_signals().map_err(StreamError::Signals)?);
+    let boarding = options.boarding.unwrap_or_else(|| lowest_comfortable(&constants, &config.machine.home));
     let checked = check_target(&constants, &pose_of(&boarding));
     checked.map_err(|bound| TargetError::from(TargetRefusal::Target(bound)))?;
     let bus = config.join().map_err(TargetError::from)?;
-    let mut source = open_source(config, &bus, playback.engage_within(), stop)?;
-    info!(%address, "moves to the boarding pose, then waits for datagrams");
-    let mut phase = Phase::Boarding;
-    while !stop.is_repeated() {
-        let newest = receiver.newest();
-        source.feed.describe_input(|| receiver.description());
-        if stop.is_requested() && !matches!(phase, Phase::Leaving) {
+    let source = open_source(config, &bus, playback.engage_within(), stop)?;
+    let [_, _, _, x, y, z] = boarding.map(|coordinate| fixed(1e3 * coordinate, 0));
+    info!(%address, "moves to the boarding pose (x, y, z = {x}, {y}, {z} mm)");
+    let survey = StreamSurvey::default();
+    let mut ride = Ride { source, receiver, survey, boarding, constants: &constants, phase: Phase::Boarding };
+    while !stop.is_repeated() && ride.step(pause.is_requested(), stop.is_requested())? {}
+    info!("{}", ride.receiver.description());
+    if stop.is_repeated() { Err(StreamError::Interrupted) } else { Ok(()) }
+}
+
+/// Home, lowered along gravity by nine tenths of the way that the workspace permits.
+fn lowest_comfortable(constants: &Constants, home: &[f64; 6]) -> [f64; 6] {
+    let down = constants.machine().gravity.try_normalize(0.0).unwrap_or_default();
+    let lowered = |by: f64| -> [f64; 6] {
+        let [alpha, beta, gamma, x, y, z] = *home;
+        [alpha, beta, gamma, x + by * down.x, y + by * down.y, z + by * down.z]
+    };
+    let is_inside = |by: &f64| check_target(constants, &pose_of(&lowered(*by))).is_ok();
+    let ways = (0..LOWEST_MM).map(|mm| 1e-3 * f64::from(mm)).take_while(is_inside);
+    lowered(COMFORTABLE_SHARE * ways.last().unwrap_or_default())
+}
+
+/// A source with the datagrams that it follows.
+struct Ride<'a> {
+    source: TargetSource<'a, StatusFeed>,
+    receiver: Receiver,
+    survey: StreamSurvey,
+    boarding: [f64; 6],
+    constants: &'a Constants,
+    phase: Phase,
+}
+
+impl Ride<'_> {
+    /// Publishes the setpoint of one period. False at the end.
+    fn step(&mut self, is_paused: bool, is_ending: bool) -> Result<bool, StreamError> {
+        let (newest, now_ns) = (self.receiver.newest(), monotonic_ns());
+        let order = self.describe(is_paused);
+        if is_ending && !matches!(self.phase, Phase::Leaving) {
             info!("moves to the boarding pose; once more ends at once");
-            phase = Phase::Leaving;
+            self.phase = Phase::Leaving;
         }
-        let now_ns = monotonic_ns();
-        match phase {
+        if order == Some(RideOrder::End) {
+            self.board("the operator ends the ride");
+        }
+        match self.phase {
             Phase::Boarding | Phase::Leaving => {
-                source.publish(boarding)?;
-                let is_there =
-                    source.active_since_ns().is_some() && is_reached(&source.present_x()?, &boarding);
-                match phase {
-                    Phase::Leaving if is_there => break,
-                    Phase::Boarding if is_there && receiver.is_alive(now_ns) => {
-                        phase = Phase::following(boarding);
+                self.source.publish(self.boarding)?;
+                let is_there = self.source.active_since_ns().is_some()
+                    && is_reached(&self.source.present_x()?, &self.boarding);
+                match self.phase {
+                    Phase::Leaving if is_there => return Ok(false),
+                    Phase::Boarding if is_there => {
+                        info!("stands at the boarding pose; hexad ride start begins the ride");
+                        self.phase = Phase::Ready;
                     }
                     _ => {}
                 }
             }
+            Phase::Ready => {
+                self.source.publish(self.boarding)?;
+                newest.iter().for_each(|it| self.survey.add(self.constants, it.arrival_ns, &it.x));
+                let may_begin = self.receiver.is_alive(now_ns) && self.survey.is_long_enough();
+                if order == Some(RideOrder::Start) && may_begin {
+                    self.receiver.take_restart();
+                    self.phase = Phase::following(self.boarding);
+                }
+            }
             Phase::Following { from, since_ns } => {
                 // The last target is newer than datagrams that were late.
-                let sample = newest.filter(|(time_ns, _)| *time_ns > since_ns).map(|(time_ns, x)| {
-                    let blend = rise(seconds(since_ns, now_ns), BLEND_S);
-                    (time_ns, straight_move(&from.into(), &x.into(), &blend).x.into())
-                });
-                source.publish_sample(sample)?;
-                if receiver.silence_s(now_ns) > receiver.pause_s {
-                    let x = source.resting_x(&constants)?;
+                let new = newest.filter(|it| it.time_ns > since_ns);
+                self.source
+                    .publish_sample(new.map(|it| (it.time_ns, blended(&from, &it.x, since_ns, now_ns))))?;
+                if is_paused || self.receiver.silence_s(now_ns) > self.receiver.pause_s {
+                    let x = self.source.resting_x(self.constants)?;
                     info!("a pause: the platform stands");
-                    phase = Phase::Pause { x, since_ns: now_ns };
+                    self.phase = Phase::Pause { x, since_ns: now_ns };
                 }
+                self.board_if_restarted();
             }
             Phase::Pause { x, since_ns } => {
-                source.publish(x)?;
-                if receiver.is_alive(now_ns) {
-                    phase = Phase::following(x);
+                self.source.publish(x)?;
+                if is_paused {
+                    self.phase = Phase::Pause { x, since_ns: now_ns };
+                } else if self.receiver.is_alive(now_ns) {
+                    self.phase = Phase::following(x);
                 } else if seconds(since_ns, now_ns) > LONG_PAUSE_S {
-                    info!("a long pause: moves to the boarding pose");
-                    phase = Phase::Boarding;
+                    self.board("a long pause");
                 }
+                self.board_if_restarted();
             }
         }
+        Ok(true)
     }
-    info!("{}", receiver.description());
-    if stop.is_repeated() { Err(StreamError::Interrupted) } else { Ok(()) }
+
+    /// Describes phase and stream to the operator. Returns what the operator, who has seen this phase, wants.
+    fn describe(&self, is_paused: bool) -> Option<RideOrder> {
+        let doubt = self.survey.doubt();
+        let phase = self.phase.shown(is_paused, doubt.is_some());
+        self.source.feed.describe(phase, || {
+            let doubt = doubt.map_or_else(String::new, |doubt| format!("{doubt}; "));
+            doubt + &self.receiver.description()
+        })
+    }
+
+    fn board_if_restarted(&mut self) {
+        if self.receiver.take_restart() {
+            self.board("the program that sends has started again");
+        }
+    }
+
+    /// Moves to the boarding pose: from there only the operator begins a ride.
+    fn board(&mut self, reason: &str) {
+        info!("{reason}: moves to the boarding pose");
+        (self.phase, self.survey) = (Phase::Boarding, StreamSurvey::default());
+    }
 }
 
 /// The source, if no other one runs. From now on this thread must be punctual.
@@ -199,8 +286,10 @@ fn open_source<'a>(
 /// What the platform does.
 #[derive(Clone, Copy)]
 enum Phase {
-    /// Goes to the boarding pose and waits for the stream there.
+    /// Goes to the boarding pose.
     Boarding,
+    /// Stands there, until the operator begins a ride.
+    Ready,
     /// Follows the stream, at first blended with the pose at which it stood.
     Following { from: [f64; 6], since_ns: u64 },
     /// Stands where it came to rest.
@@ -210,151 +299,29 @@ enum Phase {
 }
 
 impl Phase {
+    /// The phase as the operator sees it.
+    fn shown(&self, is_paused: bool, is_doubtful: bool) -> RidePhase {
+        match self {
+            Self::Boarding | Self::Leaving => RidePhase::Boarding,
+            Self::Ready if is_paused => RidePhase::Paused,
+            Self::Ready if is_doubtful => RidePhase::Doubtful,
+            Self::Ready => RidePhase::Ready,
+            Self::Following { .. } => RidePhase::Riding,
+            Self::Pause { .. } => RidePhase::Paused,
+        }
+    }
+
     fn following(from: [f64; 6]) -> Self {
         info!("follows the stream, after a blend of {BLEND_S:.0} s");
         Self::Following { from, since_ns: monotonic_ns() }
     }
 }
 
-/// Socket with the stream.
-struct Receiver {
-    socket: UdpSocket,
-    format: DatagramFormat,
-    from: Vec<IpAddr>,
-    home: [f64; 6],
-    clock: SourceClock,
-    pause_s: f64,
-    /// Arrival of the last datagram \[ns\].
-    last_ns: u64,
-    /// Datagrams since the last pause.
-    lively: u32,
-    accepted: u64,
-    rejected: RejectionCounts,
-    /// Instant at which the causes of silence are named \[ns\], until one datagram arrived.
-    silence_ends_ns: Option<u64>,
-}
-
-impl Receiver {
-    fn open(config: &Config, address: SocketAddr, options: &StreamOptions) -> Result<Self, StreamError> {
-        let format = DatagramFormat::load(options.format.as_deref().ok_or(StreamError::NoFormat)?)?;
-        if address.ip().is_unspecified() {
-            return Err(StreamError::AnyInterface(address));
-        }
-        if !address.ip().is_loopback() && options.from.is_empty() {
-            return Err(StreamError::NoSender(address));
-        }
-        let socket = UdpSocket::bind(address).and_then(|socket| {
-            socket.set_nonblocking(true)?;
-            Ok(socket)
-        });
-        let timeout_s = config.deployment.timeouts.setpoint_s;
-        Ok(Self {
-            socket: socket.map_err(|error| StreamError::Socket(address, error))?,
-            format,
-            from: options.from.clone(),
-            home: config.machine.home,
-            clock: SourceClock::new(config.deployment.setpoint.clock, (timeout_s * 1e9) as i64, true),
-            pause_s: PAUSE_S.min(PAUSE_SHARE * timeout_s),
-            last_ns: 0,
-            lively: 0,
-            accepted: 0,
-            rejected: RejectionCounts::default(),
-            silence_ends_ns: Some(monotonic_ns() + (SILENCE_S * 1e9) as u64),
-        })
-    }
-
-    /// Instant and X of the newest datagram that arrived since the last call.
-    fn newest(&mut self) -> Option<(u64, [f64; 6])> {
-        let mut newest = None;
-        // One more: what is longer is not cut to the longest.
-        let mut bytes = [0; MAX_BYTES + 1];
-        for _ in 0..DATAGRAMS {
-            let Ok((size, sender)) = self.socket.recv_from(&mut bytes) else { break };
-            let arrival_ns = monotonic_ns();
-            self.silence_ends_ns = None;
-            match self.sample(bytes.get(..size).unwrap_or_default(), sender.ip(), arrival_ns) {
-                Ok(sample) => newest = Some(sample),
-                Err(rejection) if self.rejected.add(&rejection) => {
-                    warn!(%sender, "a datagram is rejected: {rejection}");
-                }
-                Err(_) => {}
-            }
-        }
-        if self.silence_ends_ns.take_if(|end_ns| *end_ns < monotonic_ns()).is_some() {
-            warn!(
-                "no datagram has arrived for {SILENCE_S:.0} s: the program does not send, or to another address or port; \
-                 it sends broadcasts, which arrive only if --udp is the broadcast address; a firewall is between"
-            );
-        }
-        newest
-    }
-
-    /// What arrived, for the operator.
-    fn description(&self) -> String {
-        match (self.accepted, &self.rejected) {
-            (0, none) if *none == RejectionCounts::default() => "no datagram has arrived".into(),
-            (accepted, rejected) => {
-                let rate = self.clock.rate().filter(|rate| *rate != 1.0);
-                let clock = rate
-                    .map_or_else(String::new, |rate| format!("; their clock runs at {rate:.3} of real time"));
-                format!("{accepted} datagrams accepted{clock}{rejected}")
-            }
-        }
-    }
-
-    fn sample(
-        &mut self,
-        bytes: &[u8],
-        sender: IpAddr,
-        arrival_ns: u64,
-    ) -> Result<(u64, [f64; 6]), Rejection> {
-        if !self.from.is_empty() && !self.from.contains(&sender) {
-            return Err(Rejection::Sender);
-        }
-        let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
-        let Datagram { stamp_s, x } = datagram?;
-        let time_ns = match stamp_s {
-            Some(stamp_s) => self.clock.instant((stamp_s * 1e9) as i64, arrival_ns as i64)?.time_ns,
-            None => arrival_ns as i64,
-        };
-        let is_pause = self.silence_s(arrival_ns) > self.pause_s;
-        self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
-        (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);
-        Ok((time_ns as u64, x))
-    }
-
-    fn silence_s(&self, now_ns: u64) -> f64 {
-        seconds(self.last_ns, now_ns)
-    }
-
-    fn is_alive(&self, now_ns: u64) -> bool {
-        self.lively >= LIVELY && self.silence_s(now_ns) < self.pause_s
-    }
+/// A pose of the stream, blended from the pose at which the platform stood.
+fn blended(from: &[f64; 6], to: &[f64; 6], since_ns: u64, now_ns: u64) -> [f64; 6] {
+    straight_move(&(*from).into(), &(*to).into(), &rise(seconds(since_ns, now_ns), BLEND_S)).x.into()
 }
 
 fn seconds(from_ns: u64, to_ns: u64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 * 1e-9
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::commands::arguments::DEFAULT_CONFIG;
-
-    #[test]
-    fn broadcasts_arrive_at_the_broadcast_address_and_what_is_rejected_is_counted() {
-        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let options = StreamOptions { format: Some("flypt-mover".into()), from: vec![], boarding: None };
-        let mut receiver = Receiver::open(&config, "127.255.255.255:0".parse().unwrap(), &options).unwrap();
-        assert_eq!(receiver.description(), "no datagram has arrived");
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        socket.set_broadcast(true).unwrap();
-        for text in ["1,2,3,0,0,0", "1,2,3"] {
-            socket.send_to(text.as_bytes(), receiver.socket.local_addr().unwrap()).unwrap();
-        }
-        let (_, x) = receiver.newest().unwrap();
-        assert!((x[3] - config.machine.home[3] - 1e-3).abs() < 1e-12);
-        let text = receiver.description();
-        assert!(text.starts_with("1 datagrams accepted; 1 rejected: it has 3 fields"), "{text}");
-    }
 }

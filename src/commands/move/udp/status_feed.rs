@@ -10,6 +10,7 @@ use crate::commands::request::carry_out_in_background;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::operator::protocol::AnswerLine as Answer;
 use hexad_client::operator::requests::{StopBaseline, status_for_source};
+use hexad_client::operator::ride::{RideOrder, RidePhase};
 use hexad_client::operator::{OperatorError, Order};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::Request;
@@ -28,6 +29,10 @@ struct Watched {
     error: Option<String>,
     /// What the next request says of the datagrams.
     input: Option<String>,
+    /// What the source does.
+    phase: Option<RidePhase>,
+    /// The phase that the last request said, and the order in its answer.
+    order: Option<(RidePhase, RideOrder)>,
 }
 
 /// Receiver of the daemon's status. Its thread ends after it is dropped.
@@ -54,10 +59,14 @@ impl StatusFeed {
         spawn(move || {
             while let Some(shared) = weak.upgrade() {
                 let requested_ns = monotonic_ns();
-                let input = shared.lock().unwrap_or_else(PoisonError::into_inner).input.take();
-                let answer = status_for_source(&name, input);
-                shared.lock().unwrap_or_else(PoisonError::into_inner).receive(requested_ns, answer, &home);
-                drop(shared);
+                let (input, phase) = {
+                    let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                    (shared.input.take(), shared.phase)
+                };
+                let answer = status_for_source(&name, input, phase);
+                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                shared.order = phase.zip(answer.as_ref().ok().and_then(order_for_this_process));
+                shared.receive(requested_ns, answer, &home);
                 sleep(INTERVAL);
             }
         });
@@ -65,9 +74,13 @@ impl StatusFeed {
         Self { shared, watched, machine, baseline, within, engagement: None, stop: stop.clone() }
     }
 
-    /// Describes the input of this source, if the last description was sent.
-    pub fn describe_input(&self, describe: impl FnOnce() -> String) {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner).input.get_or_insert_with(describe);
+    /// Describes the input of this source, if the last description was sent, and what the source does. Returns what the operator, who
+    /// has seen it do so, wants of it.
+    pub fn describe(&self, phase: RidePhase, describe: impl FnOnce() -> String) -> Option<RideOrder> {
+        let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.input.get_or_insert_with(describe);
+        shared.phase = Some(phase);
+        shared.order.filter(|(seen, _)| *seen == phase).map(|(_, order)| order)
     }
 }
 
@@ -95,6 +108,12 @@ impl Feed for StatusFeed {
             outcome => Ok(outcome?),
         }
     }
+}
+
+/// The order of an operator for this process.
+fn order_for_this_process(answer: &Answer) -> Option<RideOrder> {
+    let mut processes = answer.status.iter().flat_map(|report| &report.sources).flat_map(|it| &it.processes);
+    processes.find(|process| process.process_id == std::process::id())?.ride_order
 }
 
 impl Watched {

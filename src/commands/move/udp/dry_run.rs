@@ -1,0 +1,199 @@
+//! `hexad move --udp --dry-run`: what a stream is like, and what the limits would make of it, before it moves anything.
+
+use core::fmt::Write as _;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector6;
+
+use super::receiver::{Arrived, Receiver, SILENCE_CAUSES};
+use super::survey::StreamSurvey;
+use super::{StreamError, StreamOptions, blended, seconds};
+use crate::commands::progress::time_bar;
+use crate::output::charts::{LineStyle, Panel, Series, write_svg};
+use hexad_client::realtime::stop_request::Stop;
+use hexad_core::control::reference::ReferenceGenerator;
+use hexad_core::control::setpoint::pose_samples::PoseSamples;
+use hexad_core::control::setpoint::target::Target;
+use hexad_core::control::signals::limits::{Limit, LimitSet};
+use hexad_core::model::rigid::{Acceleration, Motion, Twist};
+use hexad_core::model::task::{pose_of, task_coordinates};
+use hexad_daemon::constants;
+use hexad_machine::config::Config;
+use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::files::print;
+use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, percent, significant};
+
+/// Time between two looks at the socket.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+
+/// Receives for some seconds after the first datagram, prints what came, and draws it. An error if nothing came, or if its units can
+/// hardly be right.
+pub fn run(
+    config: &Config,
+    address: SocketAddr,
+    options: &StreamOptions,
+    duration_s: f64,
+    stop: &Stop,
+) -> Result<(), StreamError> {
+    let mut receiver = Receiver::open(config, address, options)?;
+    let arrived = receive(&mut receiver, duration_s, stop);
+    let (Some(first), Some(last)) = (arrived.first(), arrived.last()) else {
+        return Err(StreamError::Silence(format!("{}: {SILENCE_CAUSES}", receiver.description())));
+    };
+    let constants = constants(config);
+    let mut survey = StreamSurvey::default();
+    arrived.iter().for_each(|it| survey.add(&constants, it.arrival_ns, &it.x));
+    let digits = MotionDigits::new(config.resolution());
+    let home = Vector6::from(config.machine.home);
+    let [low, high] = survey.range.unwrap_or_default().map(|x| (Vector6::from(x) - home).into());
+    let span_s = seconds(first.arrival_ns, last.arrival_ns);
+    let mut text = format!("{} in {span_s:.1} s, {}\n", receiver.description(), timing(&arrived));
+    text += &(heading("about home") + &row("lowest", &low, digits) + &row("highest", &high, digits));
+    let followed = Followed::new(config, &arrived);
+    let _ = writeln!(text, "{}", followed.summary());
+    if let Some(path) = &options.output {
+        followed.draw(path, config)?;
+        let _ = writeln!(text, "{}", path.display());
+    }
+    print(text)?;
+    survey.doubt().map_or(Ok(()), |doubt| Err(StreamError::Silence(doubt)))
+}
+
+fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived> {
+    let (mut began, mut arrived) = (Instant::now(), vec![]);
+    let bar = time_bar(duration_s);
+    while !stop.is_requested() && began.elapsed().as_secs_f64() < duration_s {
+        bar.set_position(began.elapsed().as_millis() as u64);
+        sleep(POLL_INTERVAL);
+        while let Some(sample) = receiver.read() {
+            if arrived.is_empty() {
+                began = Instant::now();
+            }
+            arrived.extend(sample);
+        }
+    }
+    bar.finish_and_clear();
+    arrived
+}
+
+/// Rate, losses and ages. A pose is missing where the stamps leave room for one.
+fn timing(arrived: &[Arrived]) -> String {
+    let steps = arrived.iter().zip(arrived.iter().skip(1));
+    let mut steps: Vec<_> = steps.map(|(a, b)| seconds(a.time_ns, b.time_ns)).collect();
+    let mut ages: Vec<_> = arrived.iter().map(|it| seconds(it.time_ns, it.arrival_ns)).collect();
+    steps.sort_by(f64::total_cmp);
+    ages.sort_by(f64::total_cmp);
+    let at = |sorted: &[f64], share: f64| {
+        sorted.get((share * sorted.len() as f64) as usize).copied().unwrap_or_default()
+    };
+    let usual = at(&steps, 0.5);
+    if usual <= 0.0 {
+        return "too few for a rate".into();
+    }
+    let missing: f64 = steps.iter().map(|step| (step / usual).round() - 1.0).filter(|it| *it > 0.0).sum();
+    let lost = percent(missing / (missing + arrived.len() as f64));
+    let [half, late] =
+        [at(&ages, 0.5), ages.last().copied().unwrap_or_default()].map(|age| significant(1e3 * age));
+    format!(
+        "every {} ms, {lost} missing, held up by {half} ms (median) to {late} ms",
+        significant(1e3 * usual)
+    )
+}
+
+/// Time \[s\], X of the stream with its blend, and X of the reference.
+type Cycle = (f64, [f64; 6], [f64; 6]);
+
+/// The stream, and how the reference follows it.
+struct Followed {
+    cycles: Vec<Cycle>,
+    /// Largest deviation \[m\], \[rad\].
+    deviation: [f64; 2],
+    /// Cycles at a limit, and which.
+    limited: usize,
+    limits: LimitSet,
+}
+
+impl Followed {
+    /// The reference begins at rest at home, as if people boarded there.
+    fn new(config: &Config, arrived: &[Arrived]) -> Self {
+        let (constants, home) = (constants(config), config.machine.home);
+        let period_ns = constants.parameters.period_ns;
+        let mut reference = ReferenceGenerator::new(&constants);
+        let (twist, acceleration) = (Twist::default(), Acceleration::default());
+        // A machine file is refused whose home has no stop.
+        reference.verify_start(&constants, &Motion { pose: pose_of(&home), twist, acceleration }).ok();
+        let first_ns = arrived.first().map_or(0, |it| it.arrival_ns);
+        reference.begin_placed_motion(first_ns);
+        let (mut samples, mut waiting) = (PoseSamples::default(), arrived.iter().peekable());
+        let mut now_ns = first_ns;
+        let (cycles, limits) = (vec![], LimitSet::default());
+        let mut followed = Self { cycles, deviation: [0.0; 2], limited: 0, limits };
+        while waiting.peek().is_some() {
+            while let Some(it) = waiting.next_if(|it| it.arrival_ns <= now_ns) {
+                let x = blended(&home, &it.x, first_ns, it.arrival_ns);
+                samples.push(now_ns, it.time_ns, &pose_of(&x));
+            }
+            reference.advance(&constants, now_ns, Some(&Target::Samples(&samples)));
+            followed.add(seconds(first_ns, now_ns), &reference, samples.target(now_ns), &home);
+            now_ns += period_ns;
+        }
+        followed
+    }
+
+    fn add(&mut self, t: f64, reference: &ReferenceGenerator, wanted: Option<Motion>, home: &[f64; 6]) {
+        let (wanted, present) = (wanted.map_or(pose_of(home), |it| it.pose), reference.motion().pose);
+        let error = wanted.displacement_to(&present);
+        for (largest, error) in self.deviation.iter_mut().zip([error.linear.norm(), error.angular.norm()]) {
+            *largest = largest.max(error);
+        }
+        self.limited += usize::from(!reference.active_limits().is_empty());
+        self.limits = self.limits.union(reference.active_limits());
+        self.cycles.push((t, task_coordinates(&wanted, home), task_coordinates(&present, home)));
+    }
+
+    fn summary(&self) -> String {
+        let [mm, deg] = [1e3 * self.deviation[0], self.deviation[1].to_degrees()].map(significant);
+        let share = percent(self.limited as f64 / self.cycles.len().max(1) as f64);
+        let names = Limit::ALL.into_iter().filter(|it| self.limits.contains(*it)).map(Limit::name);
+        let names: Vec<_> = names.collect();
+        let of = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
+        format!(
+            "the platform would follow within {mm} mm and {deg} deg, at a limit for {share} of the time{of}"
+        )
+    }
+
+    fn draw(&self, path: &Path, config: &Config) -> Result<(), StreamError> {
+        let home = config.machine.home;
+        let lines: Vec<_> = (0..AXES.len())
+            .map(|k| {
+                let line = |x: fn(&Cycle) -> &[f64; 6]| -> Vec<_> {
+                    let of = |x: &[f64; 6]| x.get(k).copied().unwrap_or_default();
+                    let about_home = |cycle| axis_unit(k).0 * (of(x(cycle)) - of(&home));
+                    self.cycles.iter().map(|cycle| (cycle.0, about_home(cycle))).collect()
+                };
+                (line(|cycle| &cycle.1), line(|cycle| &cycle.2))
+            })
+            .collect();
+        let panel = |y_label, axes: core::ops::Range<usize>| {
+            let series = axes.flat_map(|k| {
+                let (wanted, present) = lines.get(k)?;
+                let of = |label, points, style| Series { label, points, style, color: k % 3 };
+                Some([
+                    of(AXES.get(k).copied()?, present.as_slice(), LineStyle::Solid),
+                    of("", wanted.as_slice(), LineStyle::Dashed),
+                ])
+            });
+            Panel { y_label, series: series.flatten().collect() }
+        };
+        let title = format!("{}: the stream (dashed) and how the limits permit to follow it", config.name);
+        Ok(write_svg(
+            path,
+            &title,
+            "time [s]",
+            &[panel("position about home [mm]", 3..6), panel("angles about home [deg]", 0..3)],
+        )?)
+    }
+}

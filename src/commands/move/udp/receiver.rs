@@ -1,0 +1,196 @@
+//! The socket with the stream: its poses with their instants, what is rejected, pauses, and restarts of the program that sends.
+
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+
+use tracing::warn;
+
+use super::datagram_format::{Datagram, DatagramFormat, MAX_BYTES};
+use super::rejection::{Rejection, RejectionCounts};
+use super::{StreamError, StreamOptions, seconds};
+use hexad_client::messages::clock::monotonic_ns;
+use hexad_client::messages::source_clock::SourceClock;
+use hexad_core::model::task::pose_of;
+use hexad_machine::config::Config;
+
+/// Longest time without datagrams before the platform comes to rest \[s\], if `timeouts.setpoint_ms` does not bound it.
+const PAUSE_S: f64 = 0.25;
+
+/// Share of `timeouts.setpoint_ms` after which a pause begins, so that the daemon never loses its source.
+const PAUSE_SHARE: f64 = 0.8;
+
+/// Datagrams without a pause that make a stream.
+const LIVELY: u32 = 10;
+
+/// Time without any datagram after which the possible causes are named \[s\].
+const SILENCE_S: f64 = 10.0;
+
+/// Most datagrams that are read in one period.
+const DATAGRAMS: usize = 64;
+
+/// A pose of the stream.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrived {
+    /// On the clock of this host \[ns\].
+    pub arrival_ns: u64,
+    /// Instant of the pose \[ns\].
+    pub time_ns: u64,
+    /// X.
+    pub x: [f64; 6],
+}
+
+/// Why nothing arrives, the most likely first.
+pub const SILENCE_CAUSES: &str = "the program does not send, or to another address or port; it sends broadcasts, which arrive only if --udp is the broadcast \
+     address; a firewall is between";
+
+/// Socket with the stream.
+pub struct Receiver {
+    socket: UdpSocket,
+    format: DatagramFormat,
+    from: Vec<IpAddr>,
+    home: [f64; 6],
+    clock: SourceClock,
+    /// Silence that is a pause \[s\].
+    pub pause_s: f64,
+    /// Arrival of the last datagram \[ns\].
+    last_ns: u64,
+    sender: Option<SocketAddr>,
+    /// Whether the program that sends has begun anew.
+    has_restarted: bool,
+    /// Datagrams since the last pause.
+    lively: u32,
+    accepted: u64,
+    rejected: RejectionCounts,
+    /// Instant at which the causes of silence are named \[ns\], until one datagram arrived.
+    silence_ends_ns: Option<u64>,
+}
+
+impl Receiver {
+    pub fn open(config: &Config, address: SocketAddr, options: &StreamOptions) -> Result<Self, StreamError> {
+        let format = DatagramFormat::load(options.format.as_deref().ok_or(StreamError::NoFormat)?)?;
+        if address.ip().is_unspecified() {
+            return Err(StreamError::AnyInterface(address));
+        }
+        if !address.ip().is_loopback() && options.from.is_empty() {
+            return Err(StreamError::NoSender(address));
+        }
+        let socket = UdpSocket::bind(address).and_then(|socket| {
+            socket.set_nonblocking(true)?;
+            Ok(socket)
+        });
+        let timeout_s = config.deployment.timeouts.setpoint_s;
+        Ok(Self {
+            socket: socket.map_err(|error| StreamError::Socket(address, error))?,
+            format,
+            from: options.from.clone(),
+            home: config.machine.home,
+            clock: SourceClock::new(config.deployment.setpoint.clock, (timeout_s * 1e9) as i64, true),
+            pause_s: PAUSE_S.min(PAUSE_SHARE * timeout_s),
+            last_ns: 0,
+            sender: None,
+            has_restarted: false,
+            lively: 0,
+            accepted: 0,
+            rejected: RejectionCounts::default(),
+            silence_ends_ns: Some(monotonic_ns() + (SILENCE_S * 1e9) as u64),
+        })
+    }
+
+    /// The newest pose that arrived since the last call.
+    pub fn newest(&mut self) -> Option<Arrived> {
+        let newest = (0..DATAGRAMS).map_while(|_| self.read()).flatten().last();
+        if self.silence_ends_ns.take_if(|end_ns| *end_ns < monotonic_ns()).is_some() {
+            warn!("no datagram has arrived for {SILENCE_S:.0} s: {SILENCE_CAUSES}");
+        }
+        newest
+    }
+
+    /// Reads a datagram, if there is one: its pose, unless it is rejected.
+    pub fn read(&mut self) -> Option<Option<Arrived>> {
+        // One more: what is longer is not cut to the longest.
+        let mut bytes = [0; MAX_BYTES + 1];
+        let (size, sender) = self.socket.recv_from(&mut bytes).ok()?;
+        let arrival_ns = monotonic_ns();
+        self.silence_ends_ns = None;
+        let sample = self.sample(bytes.get(..size).unwrap_or_default(), sender, arrival_ns);
+        if let Err(rejection) = &sample
+            && self.rejected.add(rejection)
+        {
+            warn!(%sender, "a datagram is rejected: {rejection}");
+        }
+        Some(sample.ok())
+    }
+
+    /// What arrived, for the operator.
+    pub fn description(&self) -> String {
+        match (self.accepted, &self.rejected) {
+            (0, none) if *none == RejectionCounts::default() => "no datagram has arrived".into(),
+            (accepted, rejected) => {
+                let rate = self.clock.rate().filter(|rate| *rate != 1.0);
+                let clock = rate
+                    .map_or_else(String::new, |rate| format!("; their clock runs at {rate:.3} of real time"));
+                format!("{accepted} datagrams accepted{clock}{rejected}")
+            }
+        }
+    }
+
+    fn sample(&mut self, bytes: &[u8], sender: SocketAddr, arrival_ns: u64) -> Result<Arrived, Rejection> {
+        if !self.from.is_empty() && !self.from.contains(&sender.ip()) {
+            return Err(Rejection::Sender);
+        }
+        let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
+        let Datagram { stamp_s, x } = datagram?;
+        let lives = self.clock.lives();
+        let time_ns = match stamp_s {
+            Some(stamp_s) => self.clock.instant((stamp_s * 1e9) as i64, arrival_ns as i64)?.time_ns,
+            None => arrival_ns as i64,
+        };
+        let is_pause = self.silence_s(arrival_ns) > self.pause_s;
+        // A program that is started again has another port. Some have another for each datagram: only after a pause it says so.
+        let is_other = is_pause && self.sender.replace(sender).is_some_and(|before| before != sender);
+        self.has_restarted |= is_other || self.clock.lives() != lives;
+        self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
+        (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);
+        Ok(Arrived { arrival_ns, time_ns: time_ns as u64, x })
+    }
+
+    /// Whether the program that sends has begun anew since the last call.
+    pub fn take_restart(&mut self) -> bool {
+        core::mem::take(&mut self.has_restarted)
+    }
+
+    pub fn silence_s(&self, now_ns: u64) -> f64 {
+        seconds(self.last_ns, now_ns)
+    }
+
+    pub fn is_alive(&self, now_ns: u64) -> bool {
+        self.lively >= LIVELY && self.silence_s(now_ns) < self.pause_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+
+    #[test]
+    fn broadcasts_arrive_at_the_broadcast_address_and_what_is_rejected_is_counted() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let options = StreamOptions {
+            format: Some("flypt-mover".into()),
+            from: vec![],
+            boarding: None,
+            ..StreamOptions::default()
+        };
+        let mut receiver = Receiver::open(&config, "127.255.255.255:0".parse().unwrap(), &options).unwrap();
+        assert_eq!(receiver.description(), "no datagram has arrived");
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_broadcast(true).unwrap();
+        for text in ["1,2,3,0,0,0", "1,2,3"] {
+            socket.send_to(text.as_bytes(), receiver.socket.local_addr().unwrap()).unwrap();
+        }
+        let x = receiver.newest().unwrap().x;
+        assert!((x[3] - config.machine.home[3] - 1e-3).abs() < 1e-12);
+        let text = receiver.description();
+        assert!(text.starts_with("1 datagrams accepted; 1 rejected: it has 3 fields"), "{text}");
+    }
+}

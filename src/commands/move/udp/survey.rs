@@ -1,0 +1,96 @@
+//! What the stream looks like before anybody rides it: how far it goes, how fast, and whether its units can be right.
+
+use nalgebra::Vector6;
+
+use hexad_core::control::constants::Constants;
+use hexad_core::model::rigid::Twist;
+use hexad_core::model::task::pose_of;
+use hexad_machine::analysis::target_motion::{ExceededBound, check_target};
+use hexad_machine::text::numbers::{AXES, axis_unit, percent, significant};
+
+use super::seconds;
+
+/// Shortest stream of which units are judged \[s\].
+const LEAST_S: f64 = 2.0;
+
+/// Longest time between two poses whose difference counts as a velocity \[s\].
+const MAX_STEP_S: f64 = 0.25;
+
+/// Largest share of poses outside of the workspace that is a matter of scale, not of units.
+const MAX_OUTSIDE: f64 = 0.05;
+
+/// Poses of a stream.
+#[derive(Clone, Debug, Default)]
+pub struct StreamSurvey {
+    poses: u32,
+    last: Option<(u64, [f64; 6])>,
+    /// Lowest and highest coordinates.
+    pub range: Option<[[f64; 6]; 2]>,
+    /// Poses outside of the workspace, and the bound that one exceeds.
+    outside: u32,
+    bound: Option<ExceededBound>,
+    /// Way \[m\] and angle \[rad\] in the time of the steps \[s\].
+    way: f64,
+    angle: f64,
+    time_s: f64,
+    /// Limits of velocity \[m/s\], \[rad/s\].
+    limits: [f64; 2],
+}
+
+impl StreamSurvey {
+    /// Adds a pose that arrived at an instant \[ns\].
+    pub fn add(&mut self, constants: &Constants, arrival_ns: u64, x: &[f64; 6]) {
+        let limits = &constants.parameters.limits;
+        self.limits = [limits.position.velocity, limits.orientation.velocity];
+        let [low, high] = self.range.unwrap_or([*x; 2]);
+        let [low, high, new] = [low, high, *x].map(Vector6::from);
+        self.range = Some([low.inf(&new).into(), high.sup(&new).into()]);
+        self.poses = self.poses.saturating_add(1);
+        if let Err(bound) = check_target(constants, &pose_of(x)) {
+            (self.outside, self.bound) = (self.outside.saturating_add(1), Some(bound));
+        }
+        if let Some((before_ns, before)) = self.last.replace((arrival_ns, *x)) {
+            let step_s = seconds(before_ns, arrival_ns);
+            if step_s < MAX_STEP_S {
+                let Twist { angular, linear } = pose_of(&before).displacement_to(&pose_of(x));
+                (self.way, self.angle) = (self.way + linear.norm(), self.angle + angular.norm());
+                self.time_s += step_s;
+            }
+        }
+    }
+
+    /// Whether enough has been seen to judge the units.
+    pub fn is_long_enough(&self) -> bool {
+        self.time_s > LEAST_S
+    }
+
+    /// Why the units of the stream are hardly those of its format.
+    pub fn doubt(&self) -> Option<String> {
+        let share = f64::from(self.outside) / f64::from(self.poses.max(1));
+        let [way, angle] = [self.way, self.angle].map(|moved| moved / self.time_s.max(LEAST_S));
+        let outside = self.bound.filter(|_| share > MAX_OUTSIDE).map(|bound| {
+            format!("{} of its poses are outside of the workspace, as by {bound}", percent(share))
+        });
+        let fast = |value: f64, limit: f64, unit: &str| {
+            let [value, limit] = [value, limit].map(significant);
+            format!("on average it moves at {value} {unit}, limit {limit} {unit}")
+        };
+        let [slow, calm] = self.limits;
+        let reason = outside
+            .or_else(|| (way > slow).then(|| fast(1e3 * way, 1e3 * slow, "mm/s")))
+            .or_else(|| (angle > calm).then(|| fast(angle.to_degrees(), calm.to_degrees(), "deg/s")))?;
+        Some(format!("do its units, or its scale, differ from its format? {reason}; {}", self.widest()))
+    }
+
+    /// The ranges of position and orientation, for people.
+    fn widest(&self) -> String {
+        let [low, high] = self.range.unwrap_or_default();
+        let ranges = AXES.iter().enumerate().zip(low.iter().zip(high)).filter(|(_, (low, high))| high > *low);
+        let ranges = ranges.map(|((k, axis), (low, high))| {
+            let (factor, unit) = axis_unit(k);
+            let [low, high] = [*low, high].map(|value| significant(factor * value));
+            format!("{axis} {low} to {high} {unit}")
+        });
+        ranges.collect::<Vec<_>>().join(", ")
+    }
+}
