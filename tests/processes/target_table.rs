@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::Path;
+use std::time::Duration;
 
 use hexad::config::Config;
 use hexad::control::signals::state::State;
@@ -12,8 +13,8 @@ use hexad::model::task::pose_of;
 use crate::support::children::{Ended, Hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::does;
-use crate::support::socket::state;
-use crate::support::trio::Trio;
+use crate::support::socket::{state, status};
+use crate::support::trio::{Trio, let_pass};
 
 const FRAMES: &str = include_str!("../commands/frames.toml");
 
@@ -31,19 +32,19 @@ fn write_table(machine: &Machine, name: &str, targets: &[[f64; 2]]) -> String {
     path.display().to_string()
 }
 
-fn options<'a>(table: &'a str, output: &'a Path, more: &[&'a str]) -> Vec<&'a str> {
+fn options<'a>(table: &'a str, output: &'a Path, average: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let output = output.to_str().expect("a path");
-    let frames = ["--tool", "tip", "--work", "table", "--tolerance", "1mm", "--average", "0.1"];
+    let frames = ["--tool", "tip", "--work", "table", "--tolerance", "1mm", "--average", average];
     [&["--table", table, "--output", output], &frames[..], more].concat()
 }
 
 fn visit(machine: &Machine, table: &str, output: &Path, more: &[&str]) -> Ended {
-    machine.hexad("goto", &options(table, output, more))
+    machine.hexad("goto", &options(table, output, "0.1", more))
 }
 
 /// Starts a visit and waits until the output has a row.
 fn start(machine: &Machine, table: &str, output: &Path, more: &[&str]) -> Hexad {
-    let visiting = Hexad::start(machine, "goto", &options(table, output, more));
+    let visiting = Hexad::start(machine, "goto", &options(table, output, "0.1", more));
     visiting.waits(|| fs::read_to_string(output).is_ok_and(|text| text.lines().count() > 1), "visit a row");
     visiting
 }
@@ -119,8 +120,18 @@ fn a_stop_ends_the_table_and_other_rows_are_not_resumed() {
     let visiting = start(machine, &table, &output, &["--engage"]);
     does(machine, "stop", &[], &["standby"]);
     visiting.ends().fails(1, "of 4 rows are in ");
-    let text = fs::read_to_string(&output).unwrap();
     trio.is_in(State::Standby);
+    let text = fs::read_to_string(&output).unwrap();
+    let interrupted = machine.path("interrupted.csv");
+    // While the lengths at the first target, home, are averaged, another person stops the platform and takes control there.
+    let visiting = Hexad::start(machine, "goto", &options(&table, &interrupted, "6", &["--engage"]));
+    visiting.waits(|| status(machine)["status"]["in_position"] == true, "be in position");
+    let_pass(Duration::from_millis(500));
+    does(machine, "stop", &[], &["standby"]);
+    machine.hexad("goto", &["--home", "--engage"]).succeeds();
+    visiting.ends().fails(1, "a stop came after it was asked for");
+    does(machine, "stop", &[], &["standby"]);
+    assert!(!interrupted.exists(), "no lengths from before and after a stop");
 
     visit(machine, &table, &output, &["--engage"]).fails(2, "exists; --resume goes on after its rows");
     let other = write_table(machine, "other.csv", &[[0.0, 1.0]]);
@@ -128,7 +139,9 @@ fn a_stop_ends_the_table_and_other_rows_are_not_resumed() {
     visit(machine, &other, &output, &["--engage", "--resume"]).fails(2, words);
     let platform = ["--table", &table, "--output", output.to_str().unwrap(), "--work", "table", "--resume"];
     machine.hexad("goto", &platform).fails(2, "line 2: the lengths are not those of the reached pose");
-    machine.hexad("goto", &options(&table, &machine.file, &["--resume"])).fails(2, "must be the header");
+    machine
+        .hexad("goto", &options(&table, &machine.file, "0.1", &["--resume"]))
+        .fails(2, "must be the header");
     assert_eq!(fs::read_to_string(&output).unwrap(), text);
     visit(machine, &table, &output, &["--engage", "--resume"]).succeeds();
     visited(machine, &output);

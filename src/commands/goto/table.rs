@@ -16,7 +16,7 @@ use crate::commands::offline_tables::read_targets;
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
 use crate::commands::progress::item_bar;
 use hexad_client::messages::{LeasedSubscriber, MeasuredMessage};
-use hexad_client::operator::protocol::{RequestLine, RequestResult};
+use hexad_client::operator::protocol::{RequestLine, RequestResult, STOPPED};
 use hexad_client::operator::requests::status;
 use hexad_client::operator::status_report::StatusReport;
 use hexad_client::realtime::stop_request::Stop;
@@ -188,6 +188,9 @@ impl Targets<'_> {
             };
             let lengths = average(&mut measured, arguments.table.average, stop)?;
             let report = client.status_under_control()?.status.unwrap_or_default();
+            if report.stops != stops {
+                return Err(MotionError::Failed(STOPPED.into()).into());
+            }
             let platform = self.platform_x(&target, &lengths, &report)?;
             Ok(log.append(&Visit { target, reached: coordinates.tool_x(&platform), is_settled, lengths })?)
         });
