@@ -41,6 +41,9 @@ fn what_is_typed_wrong_is_refused() {
         ("goto @M --home --speed 200%", ["must be in [1, 100] %", ""]),
         ("goto @M --home --speed fast", ["must be a number", ""]),
         ("goto @M --tool tap --x 1m --dry-run", ["no tool frame \"tap\", must be one of: tip;", ""]),
+        ("goto @M --table @/T.csv", [ABSENT, "--output <FILE>"]),
+        ("goto @M --table @/T.csv --output o.csv --x 1mm", ["cannot be used with", "--x <LENGTH>"]),
+        ("goto @M --x 1mm --resume", [ABSENT, "--table <FILE>"]),
         ("move @M --udp 127.0.0.1:4123 --tool tip", ["must go with --trajectory", ""]),
     ] {
         folder.refuses(line, &words);

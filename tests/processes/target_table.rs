@@ -167,7 +167,7 @@ fn a_row_that_does_not_settle_is_written_and_the_next_follows() {
     let line =
         ["--table", table, "--rotation", "quaternion", "--output", path, "--tolerance", "1nm", "--engage"];
     let said = machine.hexad("goto", &line).fails(1, "2 of 2 rows are in ");
-    assert!(said.contains("2 of them not in position (column settled)"), "{said}");
+    assert!(said.contains("2 of them not in position (column in_position)"), "{said}");
     assert_eq!(said.matches("but the platform was not in position").count(), 2, "{said}");
     let rows = rows_of(&output);
     assert!(rows.len() == 2 && rows.iter().all(|(row, _)| row[13] == 0.0), "{rows:?}");

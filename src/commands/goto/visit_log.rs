@@ -27,7 +27,7 @@ pub struct Visit {
     pub target: [f64; 6],
     /// The pose with the mean lengths.
     pub reached: [f64; 6],
-    pub is_settled: bool,
+    pub is_in_position: bool,
     /// Mean and standard deviation of each length \[m\].
     pub lengths: [[f64; 6]; 2],
 }
@@ -40,14 +40,14 @@ pub struct VisitLog {
     /// Bytes of `rows` that the file has.
     written: usize,
     count: usize,
-    unsettled: usize,
+    not_in_position: usize,
 }
 
 /// Columns with numbers; the time comes after them.
 fn number_columns() -> Vec<String> {
     let poses = ["target", "reached"].map(|group| in_group(group, &axes(""))).concat();
     let names =
-        [vec!["index".into()], poses, vec!["settled".into()], legs("length"), legs("length_deviation")];
+        [vec!["index".into()], poses, vec!["in_position".into()], legs("length"), legs("length_deviation")];
     names.concat()
 }
 
@@ -85,15 +85,15 @@ impl VisitLog {
         text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1));
         let mut rows = CsvWriter::new(&[number_columns(), vec!["time".into()]].concat());
         let header = rows.text().to_vec();
-        let [mut count, mut unsettled] = [0, 0];
+        let [mut count, mut not_in_position] = [0, 0];
         if text.len() > header.len() || !header.starts_with(&text) {
             let table = visited(path, &text, &header, config, coordinates, targets)?;
             count = table.rows().len();
-            unsettled = table.rows().iter().filter(|row| row.get(13) == Some(&0.0)).count();
+            not_in_position = table.rows().iter().filter(|row| row.get(13) == Some(&0.0)).count();
         }
         file.set_len(text.len() as u64).map_err(failed)?;
         let written = text.len().min(header.len());
-        let mut log = Self { file, path: path.into(), rows, written, count, unsettled };
+        let mut log = Self { file, path: path.into(), rows, written, count, not_in_position };
         log.write().map_err(Failure::before_start)?;
         Ok(log)
     }
@@ -105,12 +105,12 @@ impl VisitLog {
 
     /// Adds a row.
     pub fn append(&mut self, visit: &Visit) -> Result<(), FileError> {
-        let Visit { target, reached, is_settled, lengths } = visit;
+        let Visit { target, reached, is_in_position, lengths } = visit;
         self.count += 1;
-        self.unsettled += usize::from(!is_settled);
+        self.not_in_position += usize::from(!is_in_position);
         let poses = [self.count as f64].into_iter().chain(*target).chain(*reached);
         let numbers =
-            poses.chain([f64::from(u8::from(*is_settled))]).chain(lengths.iter().flatten().copied());
+            poses.chain([f64::from(u8::from(*is_in_position))]).chain(lengths.iter().flatten().copied());
         self.rows.row_with_names(numbers, [utc_now().as_str()]);
         self.write()
     }
@@ -129,7 +129,7 @@ impl VisitLog {
             // What remains is a header, which --resume reads.
             let _ = fs::remove_file(&self.path);
         }
-        [self.count, self.unsettled]
+        [self.count, self.not_in_position]
     }
 }
 
