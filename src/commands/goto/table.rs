@@ -86,9 +86,9 @@ impl GotoArguments {
         let coordinates = self.frames.coordinates(config)?;
         let table = read_targets(self.table.path(), *rotation, &coordinates.tool_x(&config.machine.home))?;
         let targets = Targets { arguments: self, config, coordinates, table };
-        let stop = Stop::on_signals()?;
         let count = targets.table.rows().len();
         if self.dry_run {
+            let stop = Stop::on_signals()?;
             let (seen, origin) = origin(config);
             let seconds = targets.check(0, seen, &stop)?;
             return Ok(print(format_args!(
@@ -96,7 +96,7 @@ impl GotoArguments {
             ))?);
         }
         let mut log = VisitLog::open(output, *resume, config, &targets.coordinates, &targets.table)?;
-        let before = log.count();
+        let (before, stop) = (log.count(), Stop::on_signals()?);
         let outcome = targets.visit(&mut log, &stop);
         let [visited, elsewhere] = log.close();
         let rows = format!("{visited} of {count} rows are in {}", output.display());

@@ -62,8 +62,9 @@ impl VisitLog {
         targets: &NumberTable,
     ) -> Result<Self, Failure> {
         let failed = |cause| Failure::before_start(FileError::on(path)(cause));
-        if is_standard(path) {
-            return Err(failed(io::Error::other("--output must be a file, which --resume can read")));
+        // Others cannot be resumed, and may be read without end.
+        if is_standard(path) || fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(failed(io::Error::other("--output must be a regular file, which --resume can read")));
         }
         let mut options = File::options();
         options.read(true).append(true).create(true).create_new(!is_to_resume);
