@@ -111,7 +111,8 @@ impl GotoArguments {
                 message: format!("{rows}, {elsewhere} of them not in position (column in_position)"),
             }),
             Ok(()) => {
-                Ok(print(format_args!("{rows}, all in position; the platform stands under control\n"))?)
+                let stands = if visited > before { "; the platform stands under control" } else { "" };
+                Ok(print(format_args!("{rows}, all in position{stands}\n"))?)
             }
         }
     }

@@ -107,13 +107,14 @@ impl VisitLog {
     /// Adds a row.
     pub fn append(&mut self, visit: &Visit) -> Result<(), FileError> {
         let Visit { target, reached, is_in_position, lengths } = visit;
-        self.count += 1;
-        self.not_in_position += usize::from(!is_in_position);
-        let poses = [self.count as f64].into_iter().chain(*target).chain(*reached);
+        let poses = [(self.count + 1) as f64].into_iter().chain(*target).chain(*reached);
         let numbers =
             poses.chain([f64::from(u8::from(*is_in_position))]).chain(lengths.iter().flatten().copied());
         self.rows.row_with_names(numbers, [utc_now().as_str()]);
-        self.write()
+        self.write()?;
+        self.count += 1;
+        self.not_in_position += usize::from(!is_in_position);
+        Ok(())
     }
 
     fn write(&mut self) -> Result<(), FileError> {
