@@ -129,7 +129,7 @@ fn a_stop_ends_the_table_and_other_rows_are_not_resumed() {
     let_pass(Duration::from_millis(500));
     does(machine, "stop", &[], &["standby"]);
     machine.hexad("goto", &["--home", "--engage"]).succeeds();
-    visiting.ends().fails(1, "a stop came after it was asked for");
+    visiting.ends().fails(1, "a stop or another request to move came");
     does(machine, "stop", &[], &["standby"]);
     assert!(!interrupted.exists(), "no lengths from before and after a stop");
 

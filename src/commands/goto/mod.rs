@@ -68,15 +68,15 @@ pub struct GotoArguments {
 impl GotoArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let has_target = !self.target.is_empty() || self.home;
-        if !has_target && !self.table.is_given() {
+        if !has_target && self.table.paths().is_none() {
             return Err(Failure {
                 exit_code: 2,
                 message: "no target: give coordinates, for example --x 100mm, or --home, or --table".into(),
             });
         }
         let config = self.machine.load()?;
-        if self.table.is_given() {
-            return self.visit_table(&config);
+        if let Some(paths) = self.table.paths() {
+            return self.visit_table(&config, paths);
         }
         if self.dry_run {
             return self.print_plan(&config);

@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::ProgressIterator;
 use nalgebra::Vector6;
 
-use super::visit_log::{Visit, VisitLog};
+use super::visit_log::VisitLog;
 use super::{GotoArguments, origin};
 use crate::commands::arguments::duration;
 use crate::commands::failure::Failure;
@@ -16,9 +16,9 @@ use crate::commands::offline_tables::read_targets;
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
 use crate::commands::progress::item_bar;
 use hexad_client::messages::{LeasedSubscriber, MeasuredMessage};
-use hexad_client::operator::protocol::{RequestLine, RequestResult, STOPPED};
+use hexad_client::operator::protocol::{RequestLine, RequestResult};
 use hexad_client::operator::requests::status;
-use hexad_client::operator::status_report::StatusReport;
+use hexad_client::operator::status_report::{StatusReport, StopNumber};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::model::forward_kinematics::{Tracker, TrackingResult};
 use hexad_core::model::task::{pose_of, task_coordinates};
@@ -60,12 +60,9 @@ pub struct TableOptions {
 }
 
 impl TableOptions {
-    pub fn is_given(&self) -> bool {
-        self.table.is_some()
-    }
-
-    fn path(&self) -> &Path {
-        self.table.as_deref().unwrap_or(Path::new(""))
+    /// Path of the table, and of the output that it requires.
+    pub fn paths(&self) -> Option<[&Path; 2]> {
+        Some([self.table.as_deref()?, self.output.as_deref()?])
     }
 }
 
@@ -73,19 +70,18 @@ impl TableOptions {
 struct Targets<'a> {
     arguments: &'a GotoArguments,
     config: &'a Config,
+    path: &'a Path,
     coordinates: Coordinates,
     table: NumberTable,
 }
 
 impl GotoArguments {
     /// Visits the targets of the table.
-    pub(super) fn visit_table(&self, config: &Config) -> Result<(), Failure> {
-        let TableOptions { output, resume, rotation, .. } = &self.table;
-        // The command line requires it.
-        let output = output.as_deref().unwrap_or(Path::new(""));
+    pub(super) fn visit_table(&self, config: &Config, [path, output]: [&Path; 2]) -> Result<(), Failure> {
+        let TableOptions { resume, rotation, .. } = &self.table;
         let coordinates = self.frames.coordinates(config)?;
-        let table = read_targets(self.table.path(), *rotation, &coordinates.tool_x(&config.machine.home))?;
-        let targets = Targets { arguments: self, config, coordinates, table };
+        let table = read_targets(path, *rotation, &coordinates.tool_x(&config.machine.home))?;
+        let targets = Targets { arguments: self, config, path, coordinates, table };
         let count = targets.table.rows().len();
         if self.dry_run {
             let stop = Stop::on_signals()?;
@@ -121,13 +117,13 @@ impl GotoArguments {
 impl Targets<'_> {
     /// Checks the rows from the given one on: each target, and the way from the row before. Returns the duration of the motion \[s\].
     fn check(&self, first: usize, seen: Observation, stop: &Stop) -> Result<f64, Failure> {
-        let Self { arguments, config, coordinates, table } = self;
+        let Self { arguments, config, path, coordinates, table } = self;
         let (constants, is_straight) = (constants(config), arguments.frames.tool.is_some());
         let at = |x| Observation { reference: Some(x), target: Some(x), ..Observation::default() };
         let go_on = || !stop.is_requested();
         // After a target that cannot be reached only the next target is checked, as there is no way to it.
         let (mut from, mut duration_s) = (Some(seen), 0.0);
-        let mut errors = TableErrors::new(name_of(arguments.table.path()));
+        let mut errors = TableErrors::new(name_of(path));
         let bar = item_bar(table.rows().len() - first, "rows checked");
         for (row, line) in table.rows().iter().zip(table.lines()).skip(first).progress_with(bar) {
             let target = six(row, 1);
@@ -159,7 +155,7 @@ impl Targets<'_> {
 
     /// Visits the rows after those in the log. Only the first motion may take control, and none after a stop.
     fn visit(&self, log: &mut VisitLog, stop: &Stop) -> Result<(), Failure> {
-        let Self { arguments, config, coordinates, table } = self;
+        let Self { arguments, config, coordinates, table, .. } = self;
         let first = log.count();
         if first == table.rows().len() {
             return Ok(());
@@ -192,16 +188,8 @@ impl Targets<'_> {
             };
             let lengths = average(&mut measured, arguments.table.average, stop)?;
             let report = client.status_under_control()?.status.unwrap_or_default();
-            if report.stops != stops {
-                return Err(MotionError::Failed(STOPPED.into()).into());
-            }
-            let platform = self.platform_x(&target, &lengths, &report)?;
-            Ok(log.append(&Visit {
-                target,
-                reached: coordinates.tool_x(&platform),
-                is_in_position,
-                lengths,
-            })?)
+            let platform = self.platform_x(&target, &lengths, &report, stops)?;
+            Ok(log.append([target, coordinates.tool_x(&platform)], is_in_position, lengths)?)
         });
         bar.finish_and_clear();
         outcome
@@ -213,12 +201,13 @@ impl Targets<'_> {
         target: &[f64; 6],
         [mean, _]: &[[f64; 6]; 2],
         report: &StatusReport,
+        stops: Option<StopNumber>,
     ) -> Result<[f64; 6], MotionError> {
         let machine = &self.config.machine;
         let to = self.coordinates.platform_x(target);
-        if !report.target.is_some_and(|held| held.iter().zip(&to).all(|(a, b)| (a - b).abs() < SAME)) {
-            let text =
-                "another request has moved the platform while its lengths were averaged; end its source";
+        let is_held = |held: &[f64; 6]| held.iter().zip(&to).all(|(a, b)| (a - b).abs() < SAME);
+        if report.stops != stops || !report.target.as_ref().is_some_and(is_held) {
+            let text = "a stop or another request to move came while lengths were averaged; ask again if this is still wanted";
             return Err(MotionError::Failed(text.into()));
         }
         let mut tracker = Tracker::new(machine, pose_of(&report.pose.unwrap_or(to)));

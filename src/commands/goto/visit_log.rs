@@ -22,16 +22,6 @@ const SAME: f64 = 1e-12;
 /// The same between lengths and those of the pose that was computed from them \[m\].
 const SAME_LENGTH_M: f64 = 1e-9;
 
-/// Visit of a target. Poses are of the tool in the work frame \[rad\], \[m\].
-pub struct Visit {
-    pub target: [f64; 6],
-    /// The pose with the mean lengths.
-    pub reached: [f64; 6],
-    pub is_in_position: bool,
-    /// Mean and standard deviation of each length \[m\].
-    pub lengths: [[f64; 6]; 2],
-}
-
 /// File of the visits.
 pub struct VisitLog {
     file: File,
@@ -62,38 +52,39 @@ impl VisitLog {
         targets: &NumberTable,
     ) -> Result<Self, Failure> {
         let failed = |cause| Failure::before_start(FileError::on(path)(cause));
+        let other = |text: &str| failed(io::Error::other(text));
         // Others cannot be resumed, and may be read without end.
         if is_standard(path) || fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-            return Err(failed(io::Error::other("--output must be a regular file, which --resume can read")));
+            return Err(other("--output must be a regular file, which --resume can read"));
         }
         let mut options = File::options();
         options.read(true).append(true).create(true).create_new(!is_to_resume);
         let mut file = options.open(path).map_err(|error| match error.kind() {
-            ErrorKind::AlreadyExists => Failure {
-                exit_code: 2,
-                message: format!(
-                    "{}: exists; --resume goes on after its rows, else name another --output",
-                    path.display()
-                ),
-            },
+            ErrorKind::AlreadyExists => {
+                other("exists; --resume goes on after its rows, else name another --output")
+            }
             _ => failed(error),
         })?;
         let mut text = vec![];
-        let locked = |_| failed(io::Error::other("another hexad goto --table writes it; end that first"));
-        file.try_lock().map_err(locked)?;
+        file.try_lock().map_err(|_| other("another hexad goto --table writes it; end that first"))?;
         file.read_to_end(&mut text).map_err(failed)?;
         // A row that was not written to its end.
         text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1));
         let mut rows = CsvWriter::new(&[number_columns(), vec!["time".into()]].concat());
-        let header = rows.text().to_vec();
+        let header = rows.text();
+        let written = text.len().min(header.len());
+        if !text.starts_with(header.get(..written).unwrap_or_default()) {
+            return Err(other(
+                "line 1: must be the header that hexad goto --table writes; name another --output",
+            ));
+        }
         let [mut count, mut not_in_position] = [0, 0];
-        if text.len() > header.len() || !header.starts_with(&text) {
-            let table = visited(path, &text, &header, config, coordinates, targets)?;
+        if text.len() > written {
+            let table = visited(path, &text, config, coordinates, targets)?;
             count = table.rows().len();
             not_in_position = table.rows().iter().filter(|row| row.get(13) == Some(&0.0)).count();
         }
         file.set_len(text.len() as u64).map_err(failed)?;
-        let written = text.len().min(header.len());
         let mut log = Self { file, path: path.into(), rows, written, count, not_in_position };
         log.write().map_err(Failure::before_start)?;
         Ok(log)
@@ -104,13 +95,17 @@ impl VisitLog {
         self.count
     }
 
-    /// Adds a row.
-    pub fn append(&mut self, visit: &Visit) -> Result<(), FileError> {
-        let Visit { target, reached, is_in_position, lengths } = visit;
-        let poses = [(self.count + 1) as f64].into_iter().chain(*target).chain(*reached);
-        let numbers =
-            poses.chain([f64::from(u8::from(*is_in_position))]).chain(lengths.iter().flatten().copied());
-        self.rows.row_with_names(numbers, [utc_now().as_str()]);
+    /// Adds a row: target and reached pose of the tool in the work frame \[rad\], \[m\], mean and standard deviation of each length \[m\].
+    pub fn append(
+        &mut self,
+        poses: [[f64; 6]; 2],
+        is_in_position: bool,
+        lengths: [[f64; 6]; 2],
+    ) -> Result<(), FileError> {
+        let index = [(self.count + 1) as f64];
+        let numbers = index.into_iter().chain(poses.into_iter().flatten());
+        let numbers = numbers.chain([f64::from(u8::from(is_in_position))]);
+        self.rows.row_with_names(numbers.chain(lengths.into_iter().flatten()), [utc_now().as_str()]);
         self.write()?;
         self.count += 1;
         self.not_in_position += usize::from(!is_in_position);
@@ -139,16 +134,10 @@ impl VisitLog {
 fn visited(
     path: &Path,
     text: &[u8],
-    header: &[u8],
     config: &Config,
     coordinates: &Coordinates,
     targets: &NumberTable,
 ) -> Result<NumberTable, TableError> {
-    let mut errors = TableErrors::new(path);
-    if !text.starts_with(header) {
-        errors.add("line 1: must be the header that hexad goto --table writes; name another --output".into());
-    }
-    errors.into_result()?;
     let table = NumberTable::from_reader(text, path, &number_columns(), &[])?;
     let mut errors = TableErrors::new(path);
     let is_same = |a: &[f64; 6], b: &[f64; 6], most| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most);
