@@ -96,6 +96,7 @@
 //! | reference generator | moves the reference towards the target, only to states with a verified stop |
 //! | regressor | matrix that takes inertial parameters to forces, see [`model::regressor`] |
 //! | release | instant at which a cycle begins, on a fixed grid |
+//! | repeatability | standard deviation of the poses reached in several visits of one target |
 //! | replay | computing the cycles of a recording again, compared bit for bit |
 //! | replica | controller that repeats every cycle in the recorder, so that the recorder has its internal state |
 //! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
@@ -115,6 +116,7 @@
 //! | trusted step | change of pose for which Newton's method is proved to find the only solution |
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
 //! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |
+//! | visit | motion to a target of a table, and what was measured there, `hexad goto --table` |
 //! | work frame | frame fixed in the base, in which the pose of a tool is given |
 #![cfg_attr(not(test), deny(clippy::print_stderr, clippy::print_stdout))] // They panic where a pipe is closed.
 

@@ -28,6 +28,8 @@ pub enum MotionError {
     Invalid(String),
     #[error("{0}")]
     Failed(String),
+    #[error("{0}")]
+    TimedOut(String),
     #[error("the daemon does not answer: {0}")]
     NoAnswer(String),
     #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
@@ -130,6 +132,7 @@ fn completed(answer: AnswerLine) -> Result<AnswerLine, MotionError> {
     match answer.result {
         RequestResult::Done => Ok(answer),
         RequestResult::Invalid => Err(MotionError::Invalid(answer.text)),
+        RequestResult::TimedOut => Err(MotionError::TimedOut(answer.text)),
         _ => Err(MotionError::Failed(answer.text)),
     }
 }

@@ -71,6 +71,19 @@ pub fn read_trajectory(
     with_derivatives(table, path)
 }
 
+/// Reads a table of targets: poses, each with the number of its row in the place of `t`. Angles stay as they are.
+pub fn read_targets(
+    path: &Path,
+    format: OrientationFormat,
+    home: &[f64; 6],
+) -> Result<NumberTable, TableError> {
+    let columns: Vec<_> = format.pose_columns().into_iter().skip(1).collect();
+    let table = NumberTable::read(path, None, &columns, &[])?;
+    let numbered = |(row, number): (&Vec<f64>, u32)| [&[f64::from(number)], &row[..]].concat();
+    let rows = table.rows().iter().zip(1..).map(numbered).collect();
+    in_task_coordinates(table.with_rows(rows), format, name_of(path), home)
+}
+
 /// The rows of a table with orientations in a format as rows of X.
 fn in_task_coordinates(
     table: NumberTable,

@@ -13,7 +13,8 @@ mod outlet;
 use clap::ValueEnum;
 use tracing::{Level, Subscriber};
 use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::fmt::format::debug_fn;
+use tracing_subscriber::fmt::format::{Writer, debug_fn};
+use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -132,6 +133,14 @@ pub fn format_name() -> &'static str {
         Some(LogFormat::Json) => "json",
         _ => "text",
     }
+}
+
+/// The present time as lines of the log have it: UTC, ISO 8601.
+pub fn utc_now() -> String {
+    let mut text = String::new();
+    // Writing to memory cannot fail.
+    let _ = SystemTime.format_time(&mut Writer::new(&mut text));
+    text
 }
 
 /// Logs the reason why the process ends, and waits until it is written, unless that takes long.

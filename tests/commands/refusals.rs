@@ -11,6 +11,7 @@ const TOOL: &str = "[[frame]]\nname = \"tip\"\nkind = \"tool\"\npose = [0.0, 0.0
 #[test]
 fn what_is_typed_wrong_is_refused() {
     let folder = Folder::new(TOOL);
+    folder.write("T.csv", "alpha,beta,gamma,x,y,z\n0,0,0,1.1,0,0\n");
     for (line, words) in [
         ("frobnicate", ["unrecognized subcommand 'frobnicate'", "Usage: hexad [OPTIONS] <COMMAND>"]),
         ("run", [ABSENT, "--config <FILE>"]),
@@ -41,6 +42,12 @@ fn what_is_typed_wrong_is_refused() {
         ("goto @M --home --speed 200%", ["must be in [1, 100] %", ""]),
         ("goto @M --home --speed fast", ["must be a number", ""]),
         ("goto @M --tool tap --x 1m --dry-run", ["no tool frame \"tap\", must be one of: tip;", ""]),
+        ("goto @M --table @/T.csv", [ABSENT, "--output <FILE>"]),
+        ("goto @M --table @/T.csv --output o.csv --x 1mm", ["cannot be used with", "--x <LENGTH>"]),
+        ("goto @M --table @/T.csv --output - --resume", ["--output must be a regular file", ""]),
+        ("goto @M --table @/T.csv --output /dev/null --resume", ["--output must be a regular file", ""]),
+        ("goto @M --table @/machine.toml --output o.csv", ["missing columns alpha, beta, gamma", ""]),
+        ("goto @M --x 1mm --resume", [ABSENT, "--table <FILE>"]),
         ("move @M --udp 127.0.0.1:4123 --tool tip", ["must go with --trajectory", ""]),
     ] {
         folder.refuses(line, &words);

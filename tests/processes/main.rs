@@ -52,6 +52,7 @@ mod requests;
 mod rounds;
 mod stale;
 mod stops_supersede;
+mod target_table;
 mod targets;
 mod trajectory;
 mod two_sources;

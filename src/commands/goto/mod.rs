@@ -1,12 +1,14 @@
 //! `hexad goto`: moves the platform, or a tool, to a pose and holds it there under control.
 //!
 //! The daemon computes the whole motion before the platform moves. A target or a path outside the workspace is refused with
-//! leg, value and bound. `--dry-run` computes it here and only prints it. A tool moves along a straight path.
+//! leg, value and bound. `--dry-run` computes it here and only prints it. A tool moves along a straight path. `--table` goes to many
+//! targets, one after the other, and writes where the platform was.
 
 use clap::Args;
 
 use self::plan::PlanText;
 use self::pose_options::PoseOptions;
+use self::table::TableOptions;
 use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
 use super::frame_options::FrameOptions;
@@ -27,6 +29,8 @@ use hexad_machine::text::numbers::MotionDigits;
 
 mod plan;
 mod pose_options;
+mod table;
+mod visit_log;
 
 #[derive(Debug, Args)]
 pub struct GotoArguments {
@@ -57,23 +61,29 @@ pub struct GotoArguments {
     /// Longest to wait for control [s]
     #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
     within: f64,
+    #[command(flatten)]
+    table: TableOptions,
 }
 
 impl GotoArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        if self.target.is_empty() && !self.home {
+        let has_target = !self.target.is_empty() || self.home;
+        if !has_target && self.table.paths().is_none() {
             return Err(Failure {
                 exit_code: 2,
-                message: "no target: give coordinates, for example --x 100mm, or --home".into(),
+                message: "no target: give coordinates, for example --x 100mm, or --home, or --table".into(),
             });
         }
         let config = self.machine.load()?;
+        if let Some(paths) = self.table.paths() {
+            return self.visit_table(&config, paths);
+        }
         if self.dry_run {
             return self.print_plan(&config);
         }
         let (coordinates, stop) = (self.frames.coordinates(&config)?, Stop::on_signals()?);
         let mut client = MotionClient::connect(&config.name, &stop)?;
-        let arrived = client.carry_out(self.line(&config)?, |text| {
+        let arrived = client.carry_out(self.line(&config, self.target.coordinates())?, |text| {
             // The platform moves, so a closed standard output is not a failure.
             let _ = print(format_args!("{text}\n"));
             Ok(())
@@ -86,15 +96,15 @@ impl GotoArguments {
         Ok(())
     }
 
-    /// The request.
-    fn line(&self, config: &Config) -> Result<RequestLine, Failure> {
+    /// The request for a target.
+    fn line(&self, config: &Config, target: [Option<f64>; 6]) -> Result<RequestLine, Failure> {
         let [tool, work] = self.frames.fields(config)?;
         Ok(RequestLine {
             engage: self.engage,
             within_s: self.within,
             tool,
             work,
-            target: Some(TargetFields::new(self.target.coordinates())),
+            target: Some(TargetFields::new(target)),
             relative: self.relative,
             home: self.home,
             speed: Some(self.speed),
@@ -103,20 +113,17 @@ impl GotoArguments {
         })
     }
 
+    /// What the daemon makes of the request.
+    fn order(&self, target: [Option<f64>; 6]) -> GotoOrder {
+        let Self { relative, home, speed, tolerance: tolerance_m, .. } = *self;
+        GotoOrder { target, relative, home, speed, tolerance_m }
+    }
+
     /// Prints the motion that the request would begin.
     fn print_plan(&self, config: &Config) -> Result<(), Failure> {
         let (coordinates, constants) = (self.frames.coordinates(config)?, constants(config));
-        let home = config.machine.home;
-        let seen = status(&config.name).ok().and_then(|answer| Observation::of_answer(&answer, 0, &home));
-        let origin = if seen.is_some() { "where the platform is" } else { "home, as no daemon answers" };
-        let seen = seen.unwrap_or_else(|| Observation { reference: Some(home), ..Observation::default() });
-        let order = GotoOrder {
-            target: self.target.coordinates(),
-            relative: self.relative,
-            home: self.home,
-            speed: self.speed,
-            tolerance_m: self.tolerance,
-        };
+        let (seen, origin) = origin(config);
+        let order = self.order(self.target.coordinates());
         let is_straight = self.frames.tool.is_some();
         let plan = GotoPlan::new(config, &constants, &order, &coordinates, is_straight, &seen, || true)?;
         Ok(print(PlanText {
@@ -128,6 +135,17 @@ impl GotoArguments {
             origin,
             speed: self.speed,
         })?)
+    }
+}
+
+/// Where a dry run begins, and as text: where the platform is, or at home.
+fn origin(config: &Config) -> (Observation, &'static str) {
+    let home = config.machine.home;
+    match status(&config.name).ok().and_then(|answer| Observation::of_answer(&answer, 0, &home)) {
+        Some(seen) => (seen, "where the platform is"),
+        None => {
+            (Observation { reference: Some(home), ..Observation::default() }, "home, as no daemon answers")
+        }
     }
 }
 
