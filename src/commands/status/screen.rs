@@ -181,7 +181,10 @@ fn source_lines(source: &SourceReport) -> String {
         .map(|process| match process.command.as_str() {
             "" => format!("{} (ended)", process.process_id),
             command if process.is_ignored => format!("ignored: {command} {}", process.process_id),
-            command => format!("{command} {} of {}", process.process_id, process.user),
+            command => {
+                let stopped = if process.is_stopped { " (STOPPED by SIGSTOP or a debugger)" } else { "" };
+                format!("{command} {} of {}{stopped}", process.process_id, process.user)
+            }
         })
         .collect();
     let from = if processes.is_empty() { "no process".into() } else { processes.join(", ") };

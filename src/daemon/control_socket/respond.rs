@@ -12,12 +12,13 @@ use super::reload::RELOAD;
 use super::{MAX_WITHIN_S, Server};
 use crate::control_socket::answer::answer_line;
 use crate::motion_requests::order::MotionOrder;
+use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG};
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
 use hexad_client::operator::ride::RideOrder;
 use hexad_client::operator::status_report::StopNumber;
-use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::state::Request;
 
 impl Server<'_> {
@@ -130,7 +131,7 @@ impl Server<'_> {
 
     /// Answer to a request that would begin control or motion, if the daemon ends, if the request may be old, or if a stop came after
     /// it was asked for.
-    pub(super) fn refusal(&self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
+    pub(super) fn refusal(&mut self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
         let state = snapshot.status.state().unwrap_or_default();
         let answer = |result, code: DiagnosticCode, text: &str| {
             Some(answer_line(result, &line.request, state, &code.into(), text.into()))
@@ -141,6 +142,14 @@ impl Server<'_> {
         }
         if line.stops.is_some_and(|stops_before| stops_before != self.stops()) {
             return answer(RequestResult::Superseded, DiagnosticCode::None, STOPPED);
+        }
+        // A silent one applies forces again when it goes on.
+        if let [one, other, ..] = self.status.drivers()[..] {
+            let is_second = snapshot.measured_publishers.used_pid == other;
+            let [used, ignored] = if is_second { [other, one] } else { [one, other] };
+            let two = Diagnostic::new(DiagnosticCode::TwoMeasuredSources, used.into(), ignored.into());
+            let text = sentence(&two);
+            return Some(answer_line(RequestResult::Refused, &line.request, state, &two, text));
         }
         let text = "the daemon was held and the request may be old; send it again";
         let is_stale = self.woke_ns < self.stale_until_ns;
