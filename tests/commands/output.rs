@@ -37,7 +37,17 @@ fn json(text: &str) -> Value {
 fn a_check_shows_the_machine_and_draws_it() {
     let folder = Folder::new("");
     let text = folder.says("check @M --drawing @/machine.svg");
-    has(&text, &[&format!("{}: valid", name()), "length", "force", "6 is best", "gain margin"]);
+    has(
+        &text,
+        &[
+            &format!("{}: valid", name()),
+            "length",
+            "force",
+            "6 is best",
+            "gain margin",
+            "\nin position  within ",
+        ],
+    );
     assert_eq!(text.matches(" deg\n").count(), 6, "a line for each leg:\n{text}");
     assert!(!text.contains("WARNING"), "no other pose is near, and no loop is bold:\n{text}");
     let words = ["from above", "from the side", "in perspective", "x [m]", "y [m]", "z [m]"];
@@ -51,6 +61,7 @@ fn a_check_shows_the_machine_and_draws_it() {
     let condition = sound["condition"].as_f64().unwrap();
     assert!((6.0..20.0).contains(&condition), "{condition}: 6 is best");
     assert_eq!(sound["loops"][0]["name"], "position");
+    assert_eq!(sound["tolerances"]["settling_s"], 0.1);
     let (code, text, _) = weak().run("check @M --json");
     let found = json(&text);
     assert_eq!((code, &found["schema"], &found["machine"]), (Some(2), &1.into(), &name().into()));

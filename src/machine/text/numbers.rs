@@ -1,5 +1,7 @@
 //! Bounds of the numbers in files, and numbers as text.
 
+use super::units::Units;
+
 /// Largest magnitude of a number in a file. No quantity is larger in SI units, and the products of four such do not
 /// overflow.
 pub const MAX_MAGNITUDE: f64 = 1e12;
@@ -54,6 +56,17 @@ pub fn significant(x: f64) -> String {
     }
 }
 
+/// A value with three significant digits in the decimal unit that suits it: `12.3 um`.
+pub fn readable(value: f64, units: Units) -> String {
+    let decimal = |(unit, _): &&(&str, f64)| units.first().is_some_and(|(si, _)| unit.ends_with(si));
+    let suits = |(_, factor): &&(&str, f64)| value.abs() >= 0.9995 * factor;
+    let found = units.iter().filter(decimal).find(suits).or(units.iter().rfind(decimal));
+    found.map_or_else(
+        || significant(value),
+        |(unit, factor)| format!("{} {unit}", significant(value / factor)),
+    )
+}
+
 /// A number with so many digits after the point, and no negative zero.
 pub fn fixed(number: f64, digits: usize) -> String {
     let text = format!("{number:.digits$}");
@@ -75,6 +88,7 @@ pub fn plain_percent(share: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::text::units::{ANGLES, LENGTHS, TIMES};
 
     #[test]
     fn numbers_have_three_digits() {
@@ -101,5 +115,20 @@ mod tests {
         assert_eq!(lengths, [[3, 3], [3, 4], [4, 5], [4, 5], [6, 6], [6, 6]]);
         assert_eq!(percent(0.00123), "0.123 %");
         assert_eq!([0.001, 0.07, 1.0].map(plain_percent), ["0.1 %", "7 %", "100 %"]);
+    }
+
+    #[test]
+    fn a_value_has_the_unit_that_suits_it() {
+        for (value, units, text) in [
+            (1.5, LENGTHS, "1.50 m"),
+            (0.9996, LENGTHS, "1.00 m"),
+            (-0.02, LENGTHS, "-20.0 mm"),
+            (3e-10, LENGTHS, "0.300 nm"),
+            (5e-3, ANGLES, "5.00 mrad"),
+            (1e-8, ANGLES, "0.0100 urad"),
+            (0.1, TIMES, "100 ms"),
+        ] {
+            assert_eq!(readable(value, units), text);
+        }
     }
 }
