@@ -3,7 +3,7 @@
 //! A number without unit is refused, because it has two likely readings. Zero needs no unit.
 
 use hexad_machine::text::excerpt::stranger;
-use hexad_machine::text::units::{ANGLES, LENGTHS, Units, in_letters};
+use hexad_machine::text::units::{ANGLES, LENGTHS, Units, in_letters, names};
 
 /// Bounds of a length and of an angle, larger than any machine.
 const LENGTH_BOUNDS: [&str; 2] = ["-1e6m", "1e6m"];
@@ -67,8 +67,7 @@ impl Quantity {
                 Err(format!("has no unit: say {text}{likely} or {text}{other}"))
             }
             None => {
-                let units: Vec<_> = self.units.iter().map(|(unit, _)| *unit).collect();
-                let (units, stranger) = (units.join(", "), stranger(text));
+                let (units, stranger) = (names(self.units), stranger(text));
                 Err(format!("must be {} in {units}, for example 5{likely}{stranger}", self.noun))
             }
         }

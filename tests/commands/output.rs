@@ -200,12 +200,18 @@ fn a_small_step_is_seen() {
             shown.lines().find(|line| line.starts_with("to ")).unwrap().split_whitespace().collect();
         assert_eq!([to[1], to[6]], [alpha, z], "{name}: {shown}");
     }
+    // In the units of a person.
+    folder.write("machine.toml", fs::read(data("piezo", "toml")).unwrap());
+    let shown = folder.says("goto @M --relative --z 5nm --alpha 0.3arcsec --dry-run --units nm,arcsec");
+    let words = shown.split_whitespace().collect::<Vec<_>>().join(" ");
+    has(&words, &["alpha arcsec beta arcsec", "y nm z nm", "to 0.300 0.000 0.000 0 0 135000005 from is"]);
 }
 
 #[test]
 fn coordinates_of_a_tool_are_planned_and_refused() {
     let folder = Folder::new(&[FRAMES, ENVELOPE].concat());
     has(&folder.says("frame list @M"), &["tip", "300.000", "work"]);
+    has(&folder.says("frame list @M --units um,mrad"), &["alpha mrad", "x um", " 300000 "]);
     // Home is x = 1.1 m, the tip 0.3 m beyond it: at the table's origin.
     let plan = folder.says("goto @M --tool tip --work table --gamma 4deg --dry-run");
     has(&plan, &["coordinates of tip in table", "4.000", "the tool goes straight", "from is home"]);

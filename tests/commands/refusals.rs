@@ -41,6 +41,12 @@ fn what_is_typed_wrong_is_refused() {
         ("goto @M --home --speed 200%", ["must be in [1, 100] %", ""]),
         ("goto @M --home --speed fast", ["must be a number", ""]),
         ("goto @M --tool tap --x 1m --dry-run", ["no tool frame \"tap\", must be one of: tip;", ""]),
+        (
+            "goto @M --home --units nm",
+            ["must be a unit of length (m, mm, um, nm) and one of angle (rad,", ""],
+        ),
+        ("status --units nm,arcsec", ["--units: name the machine", ""]),
+        ("status @M --units nm,arcsec --json", ["cannot be used with", "--json"]),
         ("move @M --udp 127.0.0.1:4123 --tool tip", ["must go with --trajectory", ""]),
     ] {
         folder.refuses(line, &words);

@@ -8,6 +8,7 @@ use crate::commands::status::screen::{legs, poses};
 use hexad_client::operator::protocol::AnswerLine as Answer;
 use hexad_machine::config::coordinates::Coordinates;
 use hexad_machine::text::numbers::{AXES, significant};
+use hexad_machine::text::units::MotionUnits;
 
 /// Content of the screen.
 pub struct JogScreen<'a> {
@@ -36,7 +37,7 @@ impl fmt::Display for JogScreen<'_> {
         writeln!(f, "{:.80}", format!("limits    {limits}"))?;
         let bound = if bound.is_empty() { "none" } else { bound.lines().next().unwrap_or_default() };
         writeln!(f, "{:.80}", format!("bound     {bound}"))?;
-        poses(f, &coordinates.report(report), &coordinates.label)?;
+        poses(f, &coordinates.report(report), &coordinates.label, MotionUnits::default())?;
         legs(f, report)?;
         writeln!(f, "\nup/down   x w/s   y e/d   z r/f   alpha t/g   beta y/h   gamma u/j   leave q")?;
         let pace = match pace {
