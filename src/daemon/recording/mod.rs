@@ -24,6 +24,7 @@ pub mod reader;
 pub mod scene;
 pub mod schema;
 pub mod table;
+pub mod table_choice;
 
 /// Topic of [`CycleMessage`].
 pub const CYCLE: &str = "/hexad/cycle";
@@ -61,6 +62,9 @@ pub enum RecordingError {
     /// Nothing of the file is left.
     #[error("{}: no complete cycle is in it: nothing can be recovered", .0.display())]
     Empty(PathBuf),
+    /// Columns were chosen that the table does not have.
+    #[error("--columns: {0}")]
+    Columns(String),
 }
 
 /// Part of a file that has changed since it was written.

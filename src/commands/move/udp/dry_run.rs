@@ -22,9 +22,10 @@ use hexad_core::model::rigid::{Acceleration, Motion, Twist};
 use hexad_core::model::task::{pose_of, task_coordinates};
 use hexad_daemon::constants;
 use hexad_machine::config::Config;
-use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
 use hexad_machine::text::files::print;
-use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, percent, significant};
+use hexad_machine::text::numbers::{AXES, axis_unit, percent, significant};
+use hexad_machine::text::units::MotionUnits;
 
 /// Time between two looks at the socket.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
@@ -46,12 +47,12 @@ pub fn run(
     let constants = constants(config);
     let mut survey = StreamSurvey::default();
     arrived.iter().for_each(|it| survey.add(&constants, it.arrival_ns, &it.x));
-    let digits = MotionDigits::new(config.resolution());
     let home = Vector6::from(config.machine.home);
     let [low, high] = survey.range.unwrap_or_default().map(|x| (Vector6::from(x) - home).into());
     let span_s = seconds(first.arrival_ns, last.arrival_ns);
     let mut text = format!("{} in {span_s:.1} s, {}\n", receiver.description(), timing(&arrived));
-    text += &(heading("about home") + &row("lowest", &low, digits) + &row("highest", &high, digits));
+    let format = CoordinateFormat::new(MotionUnits::default(), config.resolution());
+    text += &format.table("about home", &[("lowest", Some(low), 0), ("highest", Some(high), 0)]);
     let followed = Followed::new(config, &arrived);
     let _ = writeln!(text, "{}", followed.summary());
     if let Some(path) = &options.output {
