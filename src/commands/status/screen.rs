@@ -51,6 +51,8 @@ impl fmt::Display for Screen<'_> {
         let inputs =
             report.sources.iter().flat_map(|source| &source.processes).filter_map(|it| it.input.as_ref());
         inputs.map(|input| paragraph("input     ", input, WIDTH)).try_for_each(|text| write!(f, "{text}"))?;
+        let mut rides = report.sources.iter().flat_map(|source| &source.processes).filter_map(|it| it.ride);
+        rides.try_for_each(|phase| writeln!(f, "ride      {}", phase.name()))?;
         writeln!(f, "{}", file_line(&report.configuration))
     }
 }

@@ -9,6 +9,7 @@ use super::connection::Connection;
 use super::last_seconds::{LastSeconds, RECORD};
 use super::order::{Order, PendingOrder, stop_count};
 use super::reload::RELOAD;
+use super::ride::{PendingRide, answer_to_ride};
 use super::{MAX_WITHIN_S, Server};
 use crate::control_socket::answer::answer_line;
 use crate::motion_requests::order::MotionOrder;
@@ -122,6 +123,59 @@ impl Server<'_> {
             Ok(ordered) => connection.last_seconds.replace((request, ordered)).is_none(),
             Err(reason) => connection.answer(request, AnswerLine::invalid(reason)),
         }
+    }
+
+    /// Passes an order for a ride to the source, or refuses it. False if the client has left.
+    fn begin_ride(
+        &mut self,
+        connection: &mut Connection,
+        request: OpenRequest,
+        line: &RequestLine,
+        order: RideOrder,
+        snapshot: &Snapshot,
+    ) -> bool {
+        connection.peer.log_request(line);
+        let refused = |reason| answer_to_ride(RequestResult::Refused, order, snapshot, reason);
+        let (rider, stops) = (self.status.rider(self.woke_ns), self.stops());
+        let ride = PendingRide::new(order, line, rider, stops, snapshot, self.woke_ns);
+        let refusal = self.refusal(line, snapshot).or_else(|| {
+            let other = || refused("an order of this connection is in progress".into());
+            connection.ride.as_ref().map(|_| other())
+        });
+        match (refusal, ride) {
+            (None, Ok(ride)) => {
+                let accepted = answer_to_ride(RequestResult::Accepted, order, snapshot, "accepted".into());
+                let accepted = request.progress(accepted);
+                connection.ride = Some((request, ride));
+                accepted.is_none_or(|line| connection.send(&line))
+            }
+            (refusal, ride) => {
+                let answer = refusal.unwrap_or_else(|| refused(ride.err().unwrap_or_default()));
+                connection.peer.log_failure(&answer);
+                connection.answer(request, answer)
+            }
+        }
+    }
+
+    /// Answers the orders for rides that have ended, and shows the others to their sources. An order ends with the connection of who
+    /// gave it.
+    pub(super) fn advance_rides(&mut self) {
+        let (snapshot, now_ns, stops) = (*self.snapshots.read(), self.woke_ns, self.stops());
+        let rider = self.status.rider(now_ns);
+        let status = &mut self.status;
+        let mut orders = vec![];
+        self.connections.retain_mut(|connection| {
+            let Some((request, ride)) = connection.ride.take() else { return true };
+            let input = status.input(ride.source);
+            if let Some(answer) = ride.answer(rider, stops, input, &snapshot, now_ns) {
+                connection.peer.log_failure(&answer);
+                return connection.answer(request, answer);
+            }
+            orders.push((ride.source, ride.order));
+            connection.ride = Some((request, ride));
+            true
+        });
+        status.set_ride_orders(&orders);
     }
 
     /// The number of stops so far.

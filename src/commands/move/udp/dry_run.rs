@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector6;
 
 use super::receiver::{Arrived, Receiver, SILENCE_CAUSES};
+use super::stream::{StreamError, StreamOptions, blended, seconds};
 use super::survey::StreamSurvey;
-use super::{StreamError, StreamOptions, blended, seconds};
 use crate::commands::progress::time_bar;
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use hexad_client::realtime::stop_request::Stop;
@@ -27,6 +27,9 @@ use hexad_machine::text::files::print;
 use hexad_machine::text::numbers::{AXES, axis_unit, percent, significant};
 use hexad_machine::text::units::MotionUnits;
 
+/// Ranges of coordinates below which nobody feels a motion \[rad\], \[m\].
+const STANDING: [f64; 6] = [2e-3, 2e-3, 2e-3, 1e-3, 1e-3, 1e-3];
+
 /// Time between two looks at the socket.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
@@ -42,10 +45,11 @@ pub fn run(
     let mut receiver = Receiver::open(config, address, options)?;
     let arrived = receive(&mut receiver, duration_s, stop);
     let (Some(first), Some(last)) = (arrived.first(), arrived.last()) else {
-        return Err(StreamError::Silence(format!("{}: {SILENCE_CAUSES}", receiver.description())));
+        let causes = if receiver.is_silent() { format!(": {SILENCE_CAUSES}") } else { String::new() };
+        return Err(StreamError::Silence(receiver.description() + &causes));
     };
     let constants = constants(config);
-    let mut survey = StreamSurvey::default();
+    let mut survey = StreamSurvey::over(duration_s);
     arrived.iter().for_each(|it| survey.add(&constants, it.arrival_ns, &it.x));
     let home = Vector6::from(config.machine.home);
     let [low, high] = survey.range.unwrap_or_default().map(|x| (Vector6::from(x) - home).into());
@@ -55,6 +59,10 @@ pub fn run(
     text += &format.table("about home", &[("lowest", Some(low), 0), ("highest", Some(high), 0)]);
     let followed = Followed::new(config, &arrived);
     let _ = writeln!(text, "{}", followed.summary());
+    if Vector6::from(high) - Vector6::from(low) < Vector6::from(STANDING) {
+        text +=
+            "it hardly moves: is it in its menu, or are its numbers in larger units than its format says?\n";
+    }
     if let Some(path) = &options.output {
         followed.draw(path, config)?;
         let _ = writeln!(text, "{}", path.display());
@@ -64,13 +72,13 @@ pub fn run(
 }
 
 fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived> {
-    let (mut began, mut arrived) = (Instant::now(), vec![]);
+    let (mut began, mut arrived, mut was_silent) = (Instant::now(), vec![], true);
     let bar = time_bar(duration_s);
     while !stop.is_requested() && began.elapsed().as_secs_f64() < duration_s {
         bar.set_position(began.elapsed().as_millis() as u64);
         sleep(POLL_INTERVAL);
         while let Some(sample) = receiver.read() {
-            if arrived.is_empty() {
+            if core::mem::take(&mut was_silent) {
                 began = Instant::now();
             }
             arrived.extend(sample);
