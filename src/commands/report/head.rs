@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::history::{Bars, History};
 use super::levels::Extent;
+use super::list::{Row, rows};
 use super::run::Run;
 use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
@@ -46,13 +47,19 @@ struct Head<'a> {
 pub struct Events<'a> {
     facts: Vec<Fact>,
     tracks: Vec<&'a Track>,
+    rows: Vec<Row>,
     distributions: Vec<Bars>,
 }
 
 impl<'a> Events<'a> {
     /// Events of a run.
     pub fn new(run: &Run, history: &'a History) -> Self {
-        Self { facts: facts(run), tracks: history.tracks(), distributions: history.distributions() }
+        Self {
+            facts: facts(run),
+            tracks: history.tracks(),
+            rows: rows(history),
+            distributions: history.distributions(),
+        }
     }
 }
 

@@ -17,6 +17,7 @@ pub mod deadlines;
 pub mod head;
 pub mod history;
 pub mod levels;
+pub mod list;
 pub mod references;
 pub mod run;
 pub mod signals;
