@@ -45,6 +45,7 @@ struct Head<'a> {
 /// Facts, intervals and distributions of a run.
 #[derive(Serialize, Default)]
 pub struct Events<'a> {
+    is_unfinished: bool,
     facts: Vec<Fact>,
     tracks: Vec<&'a Track>,
     rows: Vec<Row>,
@@ -55,6 +56,7 @@ impl<'a> Events<'a> {
     /// Events of a run.
     pub fn new(run: &Run, history: &'a History) -> Self {
         Self {
+            is_unfinished: history.is_unfinished,
             facts: facts(run),
             tracks: history.tracks(),
             rows: rows(history),

@@ -33,7 +33,11 @@ pub fn rows(history: &History) -> Vec<Row> {
         for intervals in kinds.values() {
             match intervals[..] {
                 [first, .., last] if !track.is_whole() && intervals.len() > MAX_ROWS_OF_A_KIND => {
-                    let text = format!("{}; the first: {}", repeated(track, intervals.len()), first.text);
+                    // Missed deadlines as the summary counts them.
+                    let is_counted = track.group == "missed deadlines";
+                    let count = if is_counted { track.count } else { intervals.len() as u64 };
+                    let unit = if is_counted { "times" } else { "intervals" };
+                    let text = format!("{count} {unit}; the first: {}", first.text);
                     rows.push(Row { from: first.from, to: last.to, name: track.name, text });
                 }
                 _ => rows.extend(intervals.iter().map(|interval| row(history, track, interval))),
@@ -42,14 +46,6 @@ pub fn rows(history: &History) -> Vec<Row> {
     }
     rows.sort_by(|a, b| a.from.total_cmp(&b.from));
     rows
-}
-
-fn repeated(track: &Track, intervals: usize) -> String {
-    match track.group {
-        // As the summary counts them.
-        "missed deadlines" => format!("{} times", track.count),
-        _ => format!("{intervals} times"),
-    }
 }
 
 /// The row of a fault has its sentence.
