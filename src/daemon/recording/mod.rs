@@ -32,6 +32,8 @@ pub const CYCLE: &str = "/hexad/cycle";
 pub const MEMORY: &str = "/hexad/memory";
 /// Topic of [`GapMessage`].
 pub const GAP: &str = "/hexad/gap";
+/// Metadata of a file that `hexad recover` has completed: why it was not complete.
+const RECOVERED: &str = "recovered";
 /// Topic of the frames, as ROS tools expect it.
 pub const FRAMES: &str = "/tf";
 /// Topic of the legs, as ROS tools expect it.
