@@ -87,6 +87,7 @@ impl LegConfirmation {
     /// Keeps what a person has seen. Another thread writes the file, because the caller serves stops.
     pub fn store(self: &Arc<Self>, config: &Config, legs: [u32; LEGS]) -> Receiver<Result<String, String>> {
         let (this, (sender, receiver)) = (self.clone(), channel());
+        let failed = sender.clone();
         let seen = SeenLegs { geometry_sha1: geometry_sha1(config), legs, time: utc_now() };
         let write = move || {
             let written = write_json(&this.path, &seen);
@@ -102,8 +103,9 @@ impl LegConfirmation {
             let kept = written.map(|()| format!("kept in {}", this.path.display()));
             let _ = sender.send(kept.map_err(|error| error.to_string()));
         };
-        // If it fails, the sender is dropped, and the request fails.
-        let _ = Builder::new().name("hexad-legs".into()).stack_size(STACK_BYTES).spawn(write);
+        if let Err(error) = Builder::new().name("hexad-legs".into()).stack_size(STACK_BYTES).spawn(write) {
+            let _ = failed.send(Err(format!("no thread can write the file: {error}")));
+        }
         receiver
     }
 }
