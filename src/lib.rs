@@ -55,6 +55,7 @@
 //! | clear | operator request that ends a fault, after inspection |
 //! | computed torque | control law: inverse dynamics of the desired acceleration plus feedback on the tracking error |
 //! | condition | ratio of the largest to the smallest amplification of leg forces, see [`model::sensitivity`] |
+//! | confirmation of the legs | what a person has seen: each leg moves by its own number; kept by the daemon, `hexad confirm-legs` |
 //! | cycle | one run of the controller, from measurement to force |
 //! | demand | accelerations that a task requires in every direction |
 //! | deployment | configuration of a running machine: rate, processors, gains, limits, timeouts, topics |

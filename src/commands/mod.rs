@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 use self::advise::AdviseArguments;
 use self::arguments::MachineFile;
 use self::check::CheckArguments;
+use self::confirm_legs::ConfirmLegsArguments;
 use self::convert::ConvertArguments;
 use self::demo::DemoArguments;
 use self::doctor::DoctorArguments;
@@ -44,6 +45,7 @@ use hexad_machine::log::{FORMAT_VARIABLE, LogFormat};
 pub mod advise;
 mod arguments;
 pub mod check;
+mod confirm_legs;
 mod convert;
 pub mod demo;
 pub mod doctor;
@@ -110,6 +112,8 @@ enum CommandArguments {
     Ride(RideArguments),
     /// Move the platform by keys on a terminal, while they are held
     Jog(JogArguments),
+    /// Move one leg after the other, and keep which leg a person sees moving: exchanged cables look correct to the daemon
+    ConfirmLegs(ConfirmLegsArguments),
     /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
     Demo(DemoArguments),
     /// Take control: the platform follows the setpoint from now on
@@ -185,6 +189,7 @@ impl CommandLine {
             Is::Ride(arguments) => arguments.execute(),
             Is::Hold(arguments) => arguments.execute(),
             Is::Jog(arguments) => arguments.execute(),
+            Is::ConfirmLegs(arguments) => arguments.execute(),
             Is::Demo(arguments) => arguments.execute(),
             Is::Engage(arguments) => arguments.execute(),
             Is::Stop(arguments) => arguments.execute(Request::Stop),

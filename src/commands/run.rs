@@ -32,7 +32,7 @@ pub struct RunArguments {
     /// Delete the oldest recordings of the machine in a folder above this size, over all runs
     #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = value_parser!(u64).range(2..=16_777_216))]
     record_total_mib: u64,
-    /// Keep an emergency stop in this folder until it is cleared, also while no daemon runs
+    /// Keep an emergency stop, and the confirmation of the legs, in this folder, also while no daemon runs
     #[arg(long, value_name = "FOLDER", env = "STATE_DIRECTORY")]
     state: Option<PathBuf>,
 }

@@ -13,6 +13,7 @@ use tracing::{info, warn};
 
 use self::control_socket::location::{self, SocketError};
 use self::emergency_latch::EmergencyLatch;
+use self::leg_confirmation::LegConfirmation;
 use self::recorder::Folders;
 use self::reload::Loaded;
 use self::report::Report;
@@ -34,6 +35,7 @@ mod emergency_latch;
 mod end_watch;
 mod hints;
 mod io_thread;
+pub mod leg_confirmation;
 mod log_thread;
 mod memory_queue;
 pub mod motion_requests;
@@ -103,7 +105,7 @@ pub struct Files {
     pub histogram: Option<PathBuf>,
     /// Folders of the recordings.
     pub folders: Folders,
-    /// Folder of the emergency latch, which outlives the daemon.
+    /// Folder of the emergency latch and of the confirmation of the legs, which outlive the daemon.
     pub state: Option<PathBuf>,
 }
 
@@ -140,8 +142,11 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
         warn!("an emergency stop was not cleared before the daemon ended: it is still in force; hexad clear");
         let _ = word.post(Request::Estop as u32, monotonic_ns());
     }
+    // Simulated time has no cables.
+    let has_cables = !config.deployment.realtime.is_simulated();
+    let legs = files.state.as_deref().filter(|_| has_cables).map(LegConfirmation::open).transpose()?;
     let (report, counts_csv) =
-        threads::run(Loaded::new(config.clone()), &files.folders, latch, socket, word, stop)?;
+        threads::run(Loaded::new(config.clone()), &files.folders, (latch, legs), socket, word, stop)?;
     if let Some(path) = &files.report {
         report.write(path)?;
     }

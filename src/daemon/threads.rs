@@ -18,6 +18,7 @@ use super::emergency_latch::{EmergencyLatch, latch_link};
 use super::end_watch::end_watch;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
+use super::leg_confirmation::LegConfirmation;
 use super::log_thread::{self, LogLinks, LogReport};
 use super::memory_queue::{MemoryProducer, MemoryQueue};
 use super::motion_requests;
@@ -85,7 +86,7 @@ struct Flags {
 pub(super) fn run(
     loaded: Loaded,
     folders: &Folders,
-    latch: Option<EmergencyLatch>,
+    (latch, legs): (Option<EmergencyLatch>, Option<Arc<LegConfirmation>>),
     socket: ControlSocket,
     word: &'static RequestWord,
     stop: &Stop,
@@ -169,6 +170,7 @@ pub(super) fn run(
         reloaded,
         windows: recorder_links.orders,
         interruption: recorder_links.interruption,
+        legs,
         jobs,
         motion_snapshots,
         is_ending: &flags.is_ending,

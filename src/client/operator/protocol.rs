@@ -18,13 +18,17 @@ pub const VERSION: u32 = 1;
 /// Longest waiting time if the request gives none \[s\].
 const DEFAULT_WITHIN_S: f64 = 30.0;
 
+/// Name of the request that keeps which legs were seen to move.
+pub const CONFIRM_LEGS: &str = "confirm_legs";
+
 /// Line of a client.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RequestLine {
     /// Version of the protocol.
     pub version: u32,
-    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status`, `record`, `goto`, `hold`, `jog`, `ride_start` or `ride_end`.
+    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status`, `record`, `goto`, `hold`, `jog`, `confirm_legs`,
+    /// `ride_start` or `ride_end`.
     pub request: String,
     /// Number by which the client knows the answer: each line about this request repeats it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -91,6 +95,12 @@ pub struct RequestLine {
     /// `in_position.tolerance_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance_m: Option<f64>,
+    /// With `confirm_legs`: SHA-1 of the name and the joints of the machine file; must be that of the daemon.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry_sha1: Option<String>,
+    /// With `confirm_legs`: the leg that was seen to move, for each number, from 1. `None` only compares the geometry.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub legs: Option<[u32; 6]>,
     /// Rates of `jog`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate: Option<RateFields>,

@@ -9,8 +9,8 @@ use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use tracing::{info, warn};
 
 use super::answer::OpenRequest;
-use super::last_seconds::LastSeconds;
 use super::order::PendingOrder;
+use super::pending_file::PendingFile;
 use super::ride::PendingRide;
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
 use hexad_client::operator::users::user_name;
@@ -86,8 +86,8 @@ pub struct Connection {
     pub line: Option<RequestLine>,
     /// Number of the reload in progress.
     pub reload: Option<(OpenRequest, u64)>,
-    /// The recording of the last seconds in progress.
-    pub last_seconds: Option<(OpenRequest, LastSeconds)>,
+    /// The file in progress.
+    pub pending_file: Option<(OpenRequest, PendingFile)>,
     /// The order for a ride in progress.
     pub ride: Option<(OpenRequest, PendingRide)>,
     /// The last file that the client passed.
@@ -127,7 +127,7 @@ impl Connection {
             pending: None,
             line: None,
             reload: None,
-            last_seconds: None,
+            pending_file: None,
             ride: None,
             file: None,
             id,
@@ -142,8 +142,8 @@ impl Connection {
 
     /// Whether the client waits for an answer.
     pub fn is_waiting(&self) -> bool {
-        let Self { pending, line, reload, last_seconds, ride, waits_for_motion, .. } = self;
-        let waits = pending.is_some() || reload.is_some() || last_seconds.is_some() || ride.is_some();
+        let Self { pending, line, reload, pending_file, ride, waits_for_motion, .. } = self;
+        let waits = pending.is_some() || reload.is_some() || pending_file.is_some() || ride.is_some();
         waits || line.is_some() || *waits_for_motion
     }
 
@@ -226,11 +226,11 @@ impl Connection {
 
 impl Drop for Connection {
     fn drop(&mut self) {
-        let Self { pending, reload, last_seconds, .. } = self;
+        let Self { pending, reload, pending_file, .. } = self;
         let requests = [
             pending.take().map(|(request, _)| request),
             reload.take().map(|(request, _)| request),
-            last_seconds.take().map(|(request, _)| request),
+            pending_file.take().map(|(request, _)| request),
         ];
         requests.into_iter().flatten().for_each(OpenRequest::forget);
     }

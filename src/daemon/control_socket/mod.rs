@@ -23,6 +23,7 @@ use self::location::ControlSocket;
 use self::motion::Motions;
 use self::order::Step;
 use self::status::StatusSource;
+use super::leg_confirmation::LegConfirmation;
 use super::motion_requests::job::Job;
 use super::pose_gate::PoseGate;
 use super::recorder::WindowOrder;
@@ -35,13 +36,14 @@ use hexad_client::operator::protocol::{AnswerLine, RequestLine};
 use hexad_client::realtime::request_word::RequestWord;
 use hexad_client::realtime::triple_buffer::{Reader, Writer};
 use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::state::State;
 
 mod answer;
 mod connection;
-mod last_seconds;
 pub mod location;
 mod motion;
 mod order;
+mod pending_file;
 mod reload;
 mod respond;
 mod ride;
@@ -92,6 +94,8 @@ pub(super) struct ControlLinks<'a> {
     pub windows: SyncSender<WindowOrder>,
     /// Interruption of the recording, from the recorder.
     pub interruption: Arc<Interruption>,
+    /// Confirmation of the legs; `None` if it is not kept.
+    pub legs: Option<Arc<LegConfirmation>>,
     /// Motions and snapshots, to the motion thread.
     pub jobs: Sender<Job>,
     pub motion_snapshots: Writer<Snapshot>,
@@ -113,6 +117,7 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         server.advance_rides();
         server.answer_reloads();
         server.log_rejections();
+        server.warn_of_legs();
     }
     server.advance();
 }
@@ -147,6 +152,8 @@ struct Server<'a> {
     unserved: u64,
     /// The last logged rejections of setpoints and measurements.
     logged: [Option<Rejection>; 2],
+    /// Whether the platform was under control in the last round.
+    had_control: bool,
 }
 
 impl<'a> Server<'a> {
@@ -166,7 +173,7 @@ impl<'a> Server<'a> {
             accepted: 0,
             is_ending: links.is_ending,
             connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
-            status: StatusSource::new(loaded, links.interruption),
+            status: StatusSource::new(loaded, links.interruption, links.legs),
             clock: monotonic_ns,
             woke_ns: monotonic_ns(),
             stale_until_ns: 0,
@@ -174,6 +181,7 @@ impl<'a> Server<'a> {
             warned_ns: 0,
             unserved: 0,
             logged: [None; 2],
+            had_control: false,
         }
     }
 }
@@ -352,15 +360,23 @@ impl Server<'_> {
         }
     }
 
+    /// Warns when control begins with legs that are not confirmed.
+    fn warn_of_legs(&mut self) {
+        let has_control = self.snapshots.read().status.state().is_some_and(State::has_control);
+        if !core::mem::replace(&mut self.had_control, has_control) && has_control {
+            self.status.leg_warning().into_iter().for_each(|warning| warn!("{warning}"));
+        }
+    }
+
     /// Checks every pending request and answers those that have ended.
     fn advance(&mut self) {
         let (snapshot, now_ns, word) = (*self.snapshots.read(), (self.clock)(), self.word);
         let gate = self.gate.clone();
         let state = snapshot.status.state().unwrap_or_default();
         self.connections.retain_mut(|connection| {
-            let written = connection.last_seconds.as_ref().and_then(|(_, recording)| recording.answer(state));
+            let written = connection.pending_file.as_ref().and_then(|(_, file)| file.answer(state));
             if let Some(answer) = written
-                && let Some((request, _)) = connection.last_seconds.take()
+                && let Some((request, _)) = connection.pending_file.take()
                 && !connection.answer(request, answer)
             {
                 return false;

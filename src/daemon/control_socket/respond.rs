@@ -6,21 +6,29 @@ use tracing::debug;
 
 use super::answer::OpenRequest;
 use super::connection::Connection;
-use super::last_seconds::{LastSeconds, RECORD};
 use super::order::{Order, PendingOrder, stop_count};
+use super::pending_file::{PendingFile, RECORD};
 use super::reload::RELOAD;
 use super::ride::{PendingRide, answer_to_ride};
 use super::{MAX_WITHIN_S, Server};
 use crate::control_socket::answer::answer_line;
+use crate::leg_confirmation::{IN_ORDER, geometry_sha1};
 use crate::motion_requests::order::MotionOrder;
 use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG};
-use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use hexad_client::operator::protocol::{AnswerLine, CONFIRM_LEGS, RequestLine, RequestResult, STOPPED};
 use hexad_client::operator::ride::RideOrder;
 use hexad_client::operator::status_report::StopNumber;
 use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::state::Request;
+use hexad_core::model::LEGS;
+
+/// Answers to requests about files and legs.
+const FILE_IN_PROGRESS: &str = "a file for this connection is in progress";
+const OTHER_GEOMETRY: &str = "the daemon runs with another name or other joints than this machine file; hexad reload, or give the daemon's file";
+const NOT_KEPT: &str =
+    "not kept, as this daemon has no state folder (hexad run --state FOLDER) or runs in simulated time";
 
 impl Server<'_> {
     /// Responds to a line. False if the connection must be closed. `status` caches the answer to `status` for
@@ -45,6 +53,7 @@ impl Server<'_> {
             return match line.request.as_str() {
                 RELOAD => self.begin_reload(connection, request, line, snapshot),
                 RECORD => self.begin_recording(connection, request, line),
+                CONFIRM_LEGS => self.confirm_legs(connection, request, line, snapshot),
                 name if MotionOrder::is_named(name) => self.begin_motion(connection, request, line, snapshot),
                 other => {
                     if let Some(order) = RideOrder::ALL.into_iter().find(|it| it.name() == other) {
@@ -53,7 +62,7 @@ impl Server<'_> {
                     let names = Request::ALL.map(Request::name).join(", ");
                     let rides = RideOrder::ALL.map(RideOrder::name).join(", ");
                     let text = format!(
-                        "unknown request {other:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {rides}, {names}"
+                        "unknown request {other:?}; must be one of status, {RECORD}, {RELOAD}, {GOTO}, {HOLD}, {JOG}, {CONFIRM_LEGS}, {rides}, {names}"
                     );
                     connection.answer(request, AnswerLine::invalid(text))
                 }
@@ -115,12 +124,11 @@ impl Server<'_> {
     /// Passes a recording to the recorder. False if the client has left.
     fn begin_recording(&self, connection: &mut Connection, request: OpenRequest, line: &RequestLine) -> bool {
         connection.peer.log_request(line);
-        if connection.last_seconds.is_some() {
-            let text = "a recording of this connection is in progress".into();
-            return connection.answer(request, AnswerLine::invalid(text));
+        if connection.pending_file.is_some() {
+            return connection.answer(request, AnswerLine::invalid(FILE_IN_PROGRESS.into()));
         }
-        match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
-            Ok(ordered) => connection.last_seconds.replace((request, ordered)).is_none(),
+        match PendingFile::last_seconds(&self.windows, connection.file.take(), line.last_s) {
+            Ok(ordered) => connection.pending_file.replace((request, ordered)).is_none(),
             Err(reason) => connection.answer(request, AnswerLine::invalid(reason)),
         }
     }
@@ -176,6 +184,42 @@ impl Server<'_> {
             true
         });
         status.set_ride_orders(&orders);
+    }
+
+    /// Keeps which legs a person has seen; without legs, only compares the geometry. False if the client has left.
+    fn confirm_legs(
+        &self,
+        connection: &mut Connection,
+        request: OpenRequest,
+        line: &RequestLine,
+        snapshot: &Snapshot,
+    ) -> bool {
+        connection.peer.log_request(line);
+        let config = &self.status.loaded().config;
+        let state = snapshot.status.state().unwrap_or_default();
+        let named = |result, text| {
+            answer_line(result, CONFIRM_LEGS, state, &DiagnosticCode::None.into(), String::from(text))
+        };
+        let answer = match (line.legs, &self.status.legs) {
+            _ if line.remote.is_some() => {
+                named(RequestResult::Refused, "legs are confirmed on this host, where they are seen")
+            }
+            _ if line.geometry_sha1.as_ref() != Some(&geometry_sha1(config)) => {
+                named(RequestResult::Refused, OTHER_GEOMETRY)
+            }
+            (None, _) => named(RequestResult::Done, ""),
+            (Some(legs), _) if legs.iter().any(|leg| !IN_ORDER.contains(leg)) => {
+                AnswerLine::invalid(format!("legs {legs:?}: each must be 1 to {LEGS}"))
+            }
+            (Some(_), None) => named(RequestResult::Done, NOT_KEPT),
+            _ if connection.pending_file.is_some() => AnswerLine::invalid(FILE_IN_PROGRESS.into()),
+            (Some(legs), Some(confirmation)) => {
+                let written = confirmation.store(config, legs);
+                connection.pending_file = Some((request, PendingFile { request: CONFIRM_LEGS, written }));
+                return true;
+            }
+        };
+        connection.answer(request, answer)
     }
 
     /// The number of stops so far.

@@ -7,6 +7,7 @@ use std::process;
 use std::sync::Arc;
 
 use crate::control_socket::answer::diagnostic_report;
+use crate::leg_confirmation::LegConfirmation;
 use crate::process_names::{command, is_stopped, sentence};
 use crate::recorder::interruption::Interruption;
 use crate::reload::Loaded;
@@ -41,6 +42,8 @@ pub struct StatusSource {
     loaded: Arc<Loaded>,
     reloads: u64,
     interruption: Arc<Interruption>,
+    /// Confirmation of the legs; `None` if it is not kept.
+    pub legs: Option<Arc<LegConfirmation>>,
     /// Process of the client whose motion the daemon publishes.
     pub mover: Option<u32>,
     /// Stops so far.
@@ -79,12 +82,17 @@ impl Topics {
 
 impl StatusSource {
     /// Source for a machine.
-    pub fn new(loaded: Arc<Loaded>, interruption: Arc<Interruption>) -> Self {
+    pub fn new(
+        loaded: Arc<Loaded>,
+        interruption: Arc<Interruption>,
+        legs: Option<Arc<LegConfirmation>>,
+    ) -> Self {
         let inputs = BTreeMap::new();
         Self {
             loaded,
             reloads: 0,
             interruption,
+            legs,
             mover: None,
             stops: None,
             topics: None,
@@ -137,6 +145,11 @@ impl StatusSource {
         }
     }
 
+    /// Why the legs are not confirmed.
+    pub fn leg_warning(&self) -> Option<String> {
+        self.legs.as_ref()?.warning(&self.loaded.config)
+    }
+
     /// The configuration in force.
     pub fn loaded(&self) -> &Arc<Loaded> {
         &self.loaded
@@ -178,7 +191,10 @@ impl StatusSource {
             machine: name.clone(),
             process_id: process::id(),
             stops: self.stops,
-            warnings: deleted.into_iter().chain(self.interruption.warning(now_ns)).collect(),
+            warnings: [deleted, self.interruption.warning(now_ns), self.leg_warning()]
+                .into_iter()
+                .flatten()
+                .collect(),
             configuration: ConfigurationReport {
                 file: place.clone(),
                 sha1: loaded.sha1.clone(),
@@ -325,7 +341,7 @@ mod tests {
         (snapshot.status.condition, snapshot.status.time_to_singularity_s) = (f64::INFINITY, f64::INFINITY);
         (snapshot.status.setpoint_error_valid, snapshot.status.setpoint_position_error_m) = (1, [1e200; 3]);
         // Without topics, the processes are unknown.
-        let source = StatusSource::new(Arc::new(Loaded::new(config)), Arc::default());
+        let source = StatusSource::new(Arc::new(Loaded::new(config)), Arc::default(), None);
         let mut source = StatusSource { topics: Some(None), ..source };
         let line = source.answer(&snapshot, 2).to_line();
         let answer: AnswerLine = serde_json::from_str(&line).unwrap();

@@ -112,6 +112,7 @@ impl World {
             reloaded: results,
             windows,
             interruption: Arc::default(),
+            legs: None,
             jobs: jobs_in,
             motion_snapshots: triple_buffer(Snapshot::default()).0,
             is_ending: &NOBODY_ENDS,

@@ -192,6 +192,7 @@ fn window(recorder: &mut Recorder<'_>, orders: &SyncSender<WindowOrder>, last_s:
     recorder.windows.advance(&recorder.context, &recorder.tape);
     recorder.windows.finish(&recorder.context, &recorder.tape);
     let written = answered.recv().unwrap().unwrap();
+    let written: u64 = written.strip_suffix(" cycles").unwrap().parse().unwrap();
     let recording = Recording::open(&path).unwrap();
     let mut cycles = vec![];
     let summary = recording.each(|item| {

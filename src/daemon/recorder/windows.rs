@@ -31,7 +31,7 @@ pub struct WindowOrder {
     /// Length \[s\].
     pub last_s: f64,
     /// Channel for the number of cycles written, or the reason why there are none.
-    pub answer: Sender<Result<u64, String>>,
+    pub answer: Sender<Result<String, String>>,
 }
 
 /// Writer of windows, one after another.
@@ -51,7 +51,7 @@ struct Window {
     last: u64,
     cycles: u64,
     /// Channel to the operator who ordered it; `None` for a fault window.
-    answer: Option<Sender<Result<u64, String>>>,
+    answer: Option<Sender<Result<String, String>>>,
 }
 
 impl Windows {
@@ -152,7 +152,7 @@ impl Window {
         file: RecordingFile,
         tape: &Tape,
         first: u64,
-        answer: Option<Sender<Result<u64, String>>>,
+        answer: Option<Sender<Result<String, String>>>,
     ) -> Self {
         Self { stream: Stream::new(file, first), last: tape.newest(), cycles: 0, answer }
     }
@@ -176,7 +176,8 @@ impl Window {
         match answer {
             // The receiver is gone if the client has left.
             Some(answer) => {
-                let _ = answer.send(result.map(|_| cycles).map_err(|error| error.to_string()));
+                let _ = answer
+                    .send(result.map(|_| format!("{cycles} cycles")).map_err(|error| error.to_string()));
             }
             None => match result {
                 Ok(path) => info!("the cycles around the fault are in {}", path.display()),

@@ -67,6 +67,17 @@ pub enum Part {
     Drive(fn(&mut [f64; LEGS], &mut Context<'_>)),
     /// On the force, and on what the driver reports.
     Reported(fn(&mut [f64; LEGS], &mut Context<'_>), fn(&mut DriveStatus, &Context<'_>)),
+    /// Lengths of two legs, and of a whole exchange their forces, are exchanged from the first cycle on.
+    Exchanged(Exchange, [usize; 2]),
+}
+
+/// What is exchanged between two legs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchange {
+    Lengths,
+    LengthsAndDrives,
+    /// The same, and another sensor sends the true pose.
+    WithExternalPose,
 }
 
 /// The leg that fails.
@@ -100,6 +111,26 @@ fn freezes<const COUNT: usize>(measurement: &mut Measurement, context: &Context<
     measurement.length[..COUNT].copy_from_slice(&context.first.length[..COUNT]);
 }
 
+/// Failures of which the worst leg or pair of legs is searched, on these machines; the legs here are examples.
+pub const WORST: &[(Failure, &[&str])] = &[
+    (("two lengths exchanged", Part::Exchanged(Exchange::Lengths, [0, 1])), MACHINES),
+    (("lengths and drives exchanged, `motion_base`", AS_WHOLE), &["motion_base"]),
+    (("lengths and drives exchanged, other machines", AS_WHOLE), &["reference", "fried2008", "tsai2000"]),
+    (sensor("one quiet length frozen", |_, _| {}), MACHINES),
+];
+const MACHINES: &[&str] = &["motion_base", "reference", "fried2008", "tsai2000"];
+const AS_WHOLE: Part = Part::Exchanged(Exchange::LengthsAndDrives, [0, 1]);
+
+/// A quiet length that freezes, of each leg.
+pub fn freezes_one() -> [Part; LEGS] {
+    [freezes_at::<0>, freezes_at::<1>, freezes_at::<2>, freezes_at::<3>, freezes_at::<4>, freezes_at::<5>]
+        .map(Part::Sensor)
+}
+
+fn freezes_at<const LEG: usize>(measurement: &mut Measurement, context: &mut Context<'_>) {
+    measurement.length[LEG] = context.first.length[LEG];
+}
+
 /// Every failure with its name.
 pub const FAILURES: &[Failure] = &[
     sensor("all lengths frozen, stamps fresh", |m, c| m.length = c.first.length),
@@ -115,7 +146,9 @@ pub const FAILURES: &[Failure] = &[
     sensor("one scale 1 % too large", |m, c| m.length[LEG] += 0.01 * (m.length[LEG] - c.first.length[LEG])),
     sensor("one scale 10 % too large", |m, c| m.length[LEG] += 0.1 * (m.length[LEG] - c.first.length[LEG])),
     sensor("one length counts backwards", |m, c| m.length[LEG] = 2.0 * c.first.length[LEG] - m.length[LEG]),
-    sensor("two lengths exchanged", |m, _| m.length.swap(LEG, LEG + 1)),
+    ("two lengths exchanged", Part::Exchanged(Exchange::Lengths, [LEG, LEG + 1])),
+    ("two legs exchanged, lengths and drives", Part::Exchanged(Exchange::LengthsAndDrives, [LEG, LEG + 1])),
+    ("two legs exchanged, external pose", Part::Exchanged(Exchange::WithExternalPose, [LEG, LEG + 1])),
     sensor("one length reads zero", |m, _| m.length[LEG] = 0.0),
     sensor("one length is not a number", |m, _| m.length[LEG] = f64::NAN),
     sensor("noise of 0.1 mm on one length", |m, c| m.length[LEG] += 1e-4 * c.random.gaussian()),

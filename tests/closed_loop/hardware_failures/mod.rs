@@ -21,7 +21,7 @@ use hexad::plant::imperfections::{Imperfections, SensorErrors};
 
 use rayon::prelude::*;
 
-use self::failures::{Context, FAILURES, FROZEN, Failure, Part};
+use self::failures::{Context, Exchange, FAILURES, FROZEN, Failure, Part, WORST};
 use self::table::Row;
 use super::trust::scene;
 use hexad_support::certificate::cases;
@@ -38,6 +38,9 @@ const QUIET_NOISE_M: f64 = 3e-7;
 const FAILS_S: f64 = 4.3;
 const WATCHED_S: f64 = 3.0;
 const SLOW: f64 = 0.05;
+const WORST_HEAD: &str = "worst leg, or pair of legs";
+/// How long a quiet length is watched that freezes \[s\].
+const QUIET_WATCHED_S: f64 = 20.0;
 
 /// What the platform does when the failure begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,9 +73,9 @@ pub struct Cell {
     pub farthest: f64,
 }
 
-fn config() -> Config {
+fn config(machine: &str) -> Config {
     configured(
-        MACHINE,
+        machine,
         &format!("[drive]\ndelay_us = 100\n[measured]\nlength_noise_m = {NOISE_M}\nlength_step_m = {STEP_M}"),
     )
 }
@@ -80,7 +83,14 @@ fn config() -> Config {
 /// A failure of a machine whose sensors have the noise of its file, or less than their resolution: those are watched until the forces
 /// end, as a stop under control would follow what a frozen sensor says.
 #[expect(clippy::too_many_lines, reason = "one arm for each failure")]
-fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rates: Rates) -> Cell {
+fn cell(
+    config: &Config,
+    part: &Part,
+    situation: Situation,
+    is_quiet: bool,
+    rates: Rates,
+    watched_s: f64,
+) -> Cell {
     let length_noise = if is_quiet { QUIET_NOISE_M } else { NOISE_M };
     let sensor = SensorErrors { length_noise, length_step: STEP_M, ..SensorErrors::default() };
     let imperfections = Imperfections { seed: 3, sensor, ..Imperfections::default() };
@@ -91,19 +101,25 @@ fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rate
     let (mut measured, mut sent) = (Vec::<Measurement>::new(), Vec::<[f64; LEGS]>::new());
     let (mut began, mut farthest) = (None::<(f64, Measurement)>, 0.0_f64);
     let mut output = Output::default();
+    let is_exchanged = matches!(part, Part::Exchanged(..));
     loop {
         let time_s = control.time_s();
         let task =
             if situation.speed() > 0.0 { moving(time_s) } else { TaskState::at_rest(config.machine.home) };
         let mut input = control.waiting_input(&task);
         let measurement = input.measurement.as_mut().unwrap();
+        if let Part::Exchanged(exchange, [a, b]) = part {
+            measurement.pose = (*exchange == Exchange::WithExternalPose).then_some(true_x(&control));
+            measurement.length.swap(*a, *b);
+            measurement.rate.as_mut().into_iter().for_each(|rate| rate.swap(*a, *b));
+        }
         measured.push(*measurement);
-        let fails =
-            if situation == Situation::Engaging { output.state.has_control() } else { time_s >= FAILS_S };
+        let from_engaging = situation == Situation::Engaging || is_exchanged;
+        let fails = if from_engaging { output.state.has_control() } else { time_s >= FAILS_S };
         if began.is_none() && fails {
             began = Some((time_s, *measurement));
         }
-        let x = task_coordinates(&control.hardware.simulator().state().pose, &config.machine.home);
+        let x = true_x(&control);
         let status = DriveStatus { enabled: Some(u32::MAX), fault: Some(0), ..DriveStatus::default() };
         if let Part::Reported(..) = part {
             measurement.drives = status;
@@ -121,7 +137,7 @@ fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rate
             match part {
                 Part::Sensor(fail) => fail(measurement, context),
                 Part::Reported(_, report) => report(&mut measurement.drives, context),
-                Part::Drive(_) => {}
+                Part::Drive(_) | Part::Exchanged(..) => {}
             }
         }
         let before = output.state;
@@ -134,11 +150,11 @@ fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rate
             if stops || !has_control && output.state != State::Standby {
                 return Cell { noticed: Some((output.diagnostic.code, time_s - begin_s)), farthest };
             }
-            if time_s > begin_s + WATCHED_S {
+            if time_s > if is_exchanged { FAILS_S } else { begin_s } + watched_s {
                 return Cell { noticed: None, farthest };
             }
         }
-        assert!(time_s < FAILS_S + 1.0 + WATCHED_S, "{situation:?}: control never began, {output:?}");
+        assert!(time_s < FAILS_S + 1.0 + watched_s, "{situation:?}: control never began, {output:?}");
         sent.push(output.force);
         let mut force = has_control.then_some(output.force);
         if let (Some(force), Some((begin_s, first))) = (&mut force, began) {
@@ -153,27 +169,61 @@ fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rate
             };
             match part {
                 Part::Drive(fail) | Part::Reported(fail, _) => fail(force, &mut context),
-                Part::Sensor(_) => {}
+                Part::Sensor(_) | Part::Exchanged(Exchange::Lengths, _) => {}
+                Part::Exchanged(_, [a, b]) => force.swap(*a, *b),
             }
         }
         control.pass(force);
     }
 }
 
+fn true_x(control: &Rig) -> [f64; 6] {
+    task_coordinates(&control.simulator().state().pose, &control.machine.home)
+}
+
 #[test]
 fn certificate_every_failure_is_noticed_as_the_table_says() {
-    check("failure", &config(), FAILURES, false);
+    check("failure", &config(MACHINE), FAILURES, false);
 }
 
 /// With little noise a frozen length looks like one that stands.
 #[test]
 #[ignore = "second tier: takes long"]
 fn certificate_lengths_that_freeze_quietly_are_noticed_as_the_table_says() {
-    check("frozen lengths", &quiet(), FROZEN, true);
+    check("frozen lengths", &quiet(MACHINE), FROZEN, true);
 }
 
-fn quiet() -> Config {
-    configured(MACHINE, "[drive]\ndelay_us = 100")
+/// Of all legs and pairs of legs the worst: not noticed, then the farthest.
+#[test]
+#[ignore = "second tier: takes long"]
+fn certificate_exchanged_legs_and_quiet_lengths_of_all_machines_are_noticed_as_the_table_says() {
+    let rows = WORST.iter().map(|((name, part), machines)| (*name, worst(part, machines)));
+    let rows: Vec<_> = rows.collect();
+    match env::var_os("HEXAD_WRITE_TABLE") {
+        Some(_) => table::write(WORST_HEAD, &rows),
+        None => table::check(WORST_HEAD, WORST.iter().map(|((name, _), _)| *name), &rows, Cell::is_as),
+    }
+}
+
+fn worst(part: &Part, machines: &[&str]) -> [Cell; Situation::ALL.len()] {
+    let pairs = || (0..LEGS).flat_map(|a| (a + 1..LEGS).map(move |b| [a, b]));
+    let (parts, watched_s): (Vec<Part>, _) = match part {
+        Part::Exchanged(kind, _) => (pairs().map(|pair| Part::Exchanged(*kind, pair)).collect(), WATCHED_S),
+        _ => (failures::freezes_one().into(), QUIET_WATCHED_S),
+    };
+    let is_quiet = watched_s == QUIET_WATCHED_S;
+    let configs = machines.iter().map(|name| if is_quiet { quiet(name) } else { config(name) });
+    let configs: Vec<_> = configs.collect();
+    Situation::ALL.map(|situation| {
+        let runs = configs.par_iter().flat_map(|config| parts.par_iter().map(move |part| (config, part)));
+        let cell =
+            |(config, part): (&Config, _)| cell(config, part, situation, is_quiet, Rates::Never, watched_s);
+        runs.map(cell).max_by(Cell::order).unwrap()
+    })
+}
+
+fn quiet(machine: &str) -> Config {
+    configured(machine, "[drive]\ndelay_us = 100")
 }
 
 fn check(head: &str, config: &Config, failures: &[Failure], is_quiet: bool) {
@@ -182,12 +232,19 @@ fn check(head: &str, config: &Config, failures: &[Failure], is_quiet: bool) {
         table::write(head, &failures.par_iter().map(rows).collect::<Vec<_>>());
     } else {
         let rows: Vec<_> = cases(failures, 4).into_par_iter().map(rows).collect();
-        table::check(head, failures, &rows, Cell::is_as);
+        table::check(head, names(failures), &rows, Cell::is_as);
     }
 }
 
 fn row<'a>(config: &Config, failure: &'a Failure, is_quiet: bool, rates: Rates) -> Row<'a> {
-    (failure, Situation::ALL.map(|situation| cell(config, &failure.1, situation, is_quiet, rates)))
+    (
+        failure.0,
+        Situation::ALL.map(|situation| cell(config, &failure.1, situation, is_quiet, rates, WATCHED_S)),
+    )
+}
+
+fn names(failures: &[Failure]) -> impl Iterator<Item = &str> {
+    failures.iter().map(|(name, _)| *name)
 }
 
 /// The table is that of lengths alone, and of friction that nobody stated.
@@ -195,7 +252,7 @@ fn row<'a>(config: &Config, failure: &'a Failure, is_quiet: bool, rates: Rates) 
 #[ignore = "second tier: takes long"]
 fn certificate_with_rates_or_stated_friction_every_failure_is_noticed_and_moves_no_farther() {
     for (head, config, failures, is_quiet) in
-        [("failure", config(), FAILURES, false), ("frozen lengths", quiet(), FROZEN, true)]
+        [("failure", config(MACHINE), FAILURES, false), ("frozen lengths", quiet(MACHINE), FROZEN, true)]
     {
         let mut stated = config.clone();
         stated.machine.actuator.friction_uncertainty = 0.0;
@@ -204,6 +261,6 @@ fn certificate_with_rates_or_stated_friction_every_failure_is_noticed_and_moves_
         let rows = cases(all, 13)
             .into_par_iter()
             .map(|(failure, (config, rates))| row(config, failure, is_quiet, rates));
-        table::check(head, failures, &rows.collect::<Vec<_>>(), Cell::is_no_worse);
+        table::check(head, names(failures), &rows.collect::<Vec<_>>(), Cell::is_no_worse);
     }
 }

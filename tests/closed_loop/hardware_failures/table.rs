@@ -1,11 +1,11 @@
 //! The table in the documents: written, read back and compared.
 
+use core::cmp::Ordering;
 use std::fmt::Write as _;
 use std::fs;
 
 use hexad::control::signals::diagnostic::DiagnosticCode;
 
-use super::failures::Failure;
 use super::{Cell, Situation};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hardware_failures.md");
@@ -21,6 +21,13 @@ impl Cell {
             Some((code, time_s)) => format!("{}: {:.0} ms, {farthest}", code as u32, 1e3 * time_s),
             None => format!("{NOT_NOTICED}, {farthest}"),
         }
+    }
+
+    /// Order by danger: not noticed is worst, then the farthest.
+    pub fn order(&self, other: &Self) -> Ordering {
+        let key = |cell: &Self| (cell.noticed.is_none(), cell.farthest);
+        let ((a, a_m), (b, b_m)) = (key(self), key(other));
+        a.cmp(&b).then(a_m.total_cmp(&b_m))
     }
 
     /// Whether it is that of a text.
@@ -61,7 +68,7 @@ fn number(text: &str, unit: &str) -> Option<f64> {
 }
 
 /// A failure, and what became of it in each situation.
-pub type Row<'a> = (&'a Failure, [Cell; Situation::ALL.len()]);
+pub type Row<'a> = (&'a str, [Cell; Situation::ALL.len()]);
 
 /// The document before a table, the table, and what follows. Its first line begins with the head of its first column.
 fn parts<'a>(document: &'a str, head: &str) -> [&'a str; 3] {
@@ -76,7 +83,7 @@ pub fn write(head: &str, rows: &[Row]) {
     let [before, _, after] = parts(&document, head);
     let mut text =
         format!("{before}| {head} | at rest | slow | fast | engaging |\n| --- | --- | --- | --- | --- |\n");
-    for ((name, _), cells) in rows {
+    for (name, cells) in rows {
         let cells: Vec<String> = cells.iter().map(Cell::text).collect();
         writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
     }
@@ -84,12 +91,17 @@ pub fn write(head: &str, rows: &[Row]) {
 }
 
 /// Compares these rows with the table of the documents, which has all.
-pub fn check(head: &str, all: &[Failure], rows: &[Row], is_right: fn(&Cell, &str) -> bool) {
+pub fn check<'a>(
+    head: &str,
+    all: impl Iterator<Item = &'a str>,
+    rows: &[Row],
+    is_right: fn(&Cell, &str) -> bool,
+) {
     let document = fs::read_to_string(FILE).unwrap();
     let [_, table, _] = parts(&document, head);
     let lines = table.lines().skip(2).map(|line| line.trim_matches('|').split('|').map(str::trim));
     let lines: Vec<Vec<&str>> = lines.map(Iterator::collect).collect();
-    assert!(lines.iter().map(|texts| texts[0]).eq(all.iter().map(|(name, _)| *name)), "{FILE}: rows");
+    assert!(lines.iter().map(|texts| texts[0]).eq(all), "{FILE}: rows");
     let mut wrong = String::new();
     let numbers = lines.iter().flat_map(|texts| &texts[1..]);
     let numbers = numbers.filter_map(|text| text.split_once(':')?.0.parse::<u32>().ok());
@@ -97,7 +109,7 @@ pub fn check(head: &str, all: &[Failure], rows: &[Row], is_right: fn(&Cell, &str
         let legend = format!("| {} | {} |", code as u32, code.name());
         assert!(document.contains(&legend), "{FILE}: no row {legend}");
     }
-    for ((name, _), cells) in rows {
+    for (name, cells) in rows {
         let texts = lines.iter().find(|texts| texts[0] == *name).unwrap();
         for (text, (cell, situation)) in texts[1..].iter().zip(cells.iter().zip(Situation::ALL)) {
             if !is_right(cell, text) {

@@ -1,4 +1,5 @@
-//! Request `record`: the recorder writes the last seconds to a file that the client passes with the line.
+//! Requests whose answer comes when another thread has written a file: `record`, for which the recorder writes the last seconds to a
+//! file that the client passes with the line, and `confirm_legs`.
 
 use std::fs::File;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
@@ -15,13 +16,18 @@ pub const RECORD: &str = "record";
 /// Length if the request gives none \[s\]: all cycles that the recorder keeps.
 const ALL_S: f64 = 1e9;
 
-/// Recording of the last seconds in progress.
+/// File that another thread writes.
 #[derive(Debug)]
-pub struct LastSeconds(Receiver<Result<u64, String>>);
+pub struct PendingFile {
+    /// Name of the request.
+    pub request: &'static str,
+    /// Text of the answer, or why the file was not written.
+    pub written: Receiver<Result<String, String>>,
+}
 
-impl LastSeconds {
-    /// Passes a request to the recorder. The error is a sentence for the client.
-    pub fn order(
+impl PendingFile {
+    /// Passes a request for the last seconds to the recorder. The error is a sentence for the client.
+    pub fn last_seconds(
         windows: &SyncSender<WindowOrder>,
         file: Option<File>,
         last_s: Option<f64>,
@@ -35,20 +41,20 @@ impl LastSeconds {
         let (answer, answered) = channel();
         let order = WindowOrder { file, last_s: last_s.unwrap_or(ALL_S), answer };
         windows.try_send(order).map_err(|_| "the recorder has other recordings to write; try again")?;
-        Ok(Self(answered))
+        Ok(Self { request: RECORD, written: answered })
     }
 
-    /// The answer, once the recording has ended.
+    /// The answer, once the file is written.
     pub fn answer(&self, state: State) -> Option<AnswerLine> {
-        let (result, text) = match self.0.try_recv() {
-            Ok(Ok(cycles)) => (RequestResult::Done, format!("{cycles} cycles")),
+        let (result, text) = match self.written.try_recv() {
+            Ok(Ok(text)) => (RequestResult::Done, text),
             Ok(Err(why)) => (RequestResult::Failed, why),
             Err(TryRecvError::Empty) => return None,
             Err(TryRecvError::Disconnected) => {
                 (RequestResult::Failed, DiagnosticCode::DaemonEnding.name().into())
             }
         };
-        Some(answer_line(result, RECORD, state, &Diagnostic::default(), text))
+        Some(answer_line(result, self.request, state, &Diagnostic::default(), text))
     }
 }
 
@@ -60,16 +66,16 @@ mod tests {
     #[test]
     fn only_a_regular_file_is_written_and_the_answer_is_that_of_the_recorder() {
         let (windows, orders) = sync_channel(1);
-        let refused = |file: Option<File>| LastSeconds::order(&windows, file, None).unwrap_err();
+        let refused = |file: Option<File>| PendingFile::last_seconds(&windows, file, None).unwrap_err();
         assert!(refused(None).starts_with("record needs an open file"));
         assert_eq!(refused(Some(File::open("/dev/null").unwrap())), "record needs a regular file");
         let file = || Some(tempfile::tempfile().unwrap());
-        let ordered = LastSeconds::order(&windows, file(), Some(2.0)).unwrap();
+        let ordered = PendingFile::last_seconds(&windows, file(), Some(2.0)).unwrap();
         assert!(refused(file()).starts_with("the recorder has other recordings to write"));
         assert_eq!(ordered.answer(State::Off), None);
         let order: WindowOrder = orders.recv().unwrap();
         assert_eq!(order.last_s, 2.0);
-        order.answer.send(Ok(7)).unwrap();
+        order.answer.send(Ok("7 cycles".into())).unwrap();
         let answer = ordered.answer(State::Off).unwrap();
         assert_eq!((answer.result, answer.text.as_str()), (RequestResult::Done, "7 cycles"));
         drop(order);
