@@ -13,8 +13,11 @@ import sys
 EVENT = struct.Struct("llHHi")  # struct input_event of Linux: time, type, code, value
 KEY_PRESSED = (1, 1)
 
+if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
+    sys.exit(__doc__)
+button = open(sys.argv[1], "rb", buffering=0)
 try:
-    with open(sys.argv[1], "rb", buffering=0) as button:
+    with button:
         while event := button.read(EVENT.size):
             _, _, kind, _, value = EVENT.unpack(event)
             if (kind, value) == KEY_PRESSED:

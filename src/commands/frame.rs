@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::arguments::MachineFile;
 use super::failure::{CommandError, Failure};
-use super::frame_options::FrameOptions;
+use super::frame_options::{FrameOptions, UnitOptions};
 use super::machine_file::{difference, with_frame, write_new};
 use hexad_client::operator::requests::status;
 use hexad_core::model::rigid::Pose;
@@ -15,9 +15,10 @@ use hexad_core::motion::frames::Frames;
 use hexad_daemon::target_source::{Observation, TargetError};
 use hexad_machine::config::Config;
 use hexad_machine::config::frames::{FrameKind, NamedFrame};
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
 use hexad_machine::text::files::print;
-use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, fixed};
 use hexad_machine::text::text_table::{Left, Right, text_table};
+use hexad_machine::text::units::MotionUnits;
 
 #[derive(Debug, Args)]
 pub struct FrameArguments {
@@ -28,9 +29,17 @@ pub struct FrameArguments {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Show the frames of a machine file
-    List(MachineFile),
+    List(ListArguments),
     /// Write a new machine file with a frame where the platform is now
     Set(SetArguments),
+}
+
+#[derive(Debug, Args)]
+struct ListArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    #[command(flatten)]
+    units: UnitOptions,
 }
 
 #[derive(Debug, Args)]
@@ -74,7 +83,9 @@ impl CommandError for FrameError {}
 impl FrameArguments {
     pub fn execute(self) -> Result<(), Failure> {
         match self.action {
-            Action::List(machine) => Ok(print(table(&machine.load()?))?),
+            Action::List(ListArguments { machine, units }) => {
+                Ok(print(table(&machine.load()?, units.units()))?)
+            }
             Action::Set(arguments) => arguments.execute(),
         }
     }
@@ -131,23 +142,21 @@ fn frame_here(frames: &Frames, kind: FrameKind, platform: &Pose) -> Pose {
 }
 
 /// A line for each frame.
-fn table(config: &Config) -> String {
+fn table(config: &Config, units: MotionUnits) -> String {
     if config.frames.is_empty() {
         return format!(
             "{}: no [[frame]]; hexad frame set NAME --here --kind tool|work adds one\n",
             config.place
         );
     }
-    let digits = MotionDigits::new(config.resolution());
-    let names: Vec<_> =
-        (0..6).map(|k| format!("{} {}", AXES.get(k).unwrap_or(&""), axis_unit(k).1)).collect();
+    let format = CoordinateFormat::new(units, config.resolution());
+    let names: Vec<_> = format.names().collect();
     let columns: Vec<_> = [("frame", Left), ("kind", Left)]
         .into_iter()
         .chain(names.iter().map(|name| (name.as_str(), Right)))
         .collect();
     let rows = config.frames.iter().map(|NamedFrame { name, kind, x }| {
-        let numbers = x.iter().enumerate().map(|(k, x)| fixed(x * axis_unit(k).0, digits.of_axis(k)));
-        [name.clone(), kind.to_string()].into_iter().chain(numbers).collect::<Vec<_>>()
+        [name.clone(), kind.to_string()].into_iter().chain(format.numbers(x, 0)).collect::<Vec<_>>()
     });
     text_table(2, &columns, rows)
 }

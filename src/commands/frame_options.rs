@@ -1,4 +1,4 @@
-//! Options of a command for its coordinates: a tool and a work frame of the machine file.
+//! Options of a command for its coordinates: a tool and a work frame of the machine file, and units.
 
 use clap::Args;
 
@@ -10,6 +10,7 @@ use hexad_core::motion::rotation_order::RotationOrder;
 use hexad_machine::config::Config;
 use hexad_machine::config::coordinates::Coordinates;
 use hexad_machine::config::frames::UnknownFrames;
+use hexad_machine::text::units::MotionUnits;
 
 #[derive(Clone, Debug, Default, Args)]
 pub struct FrameOptions {
@@ -19,6 +20,24 @@ pub struct FrameOptions {
     /// Coordinates are in this work frame of the machine file; without it, in the base frame
     #[arg(long, value_name = "NAME")]
     pub work: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, Args)]
+pub struct UnitOptions {
+    /// Units of the coordinates that are shown, a length and an angle: m, mm, um, nm and rad, mrad, urad, deg, arcmin, arcsec [default: mm,deg]
+    #[arg(long, value_name = "LENGTH,ANGLE", value_parser = MotionUnits::read)]
+    units: Option<MotionUnits>,
+}
+
+impl UnitOptions {
+    pub fn is_empty(self) -> bool {
+        self.units.is_none()
+    }
+
+    /// The chosen units, else millimetres and degrees.
+    pub fn units(self) -> MotionUnits {
+        self.units.unwrap_or_default()
+    }
 }
 
 impl FrameOptions {

@@ -1,9 +1,9 @@
-//! Lengths and angles of the command line, each with its unit: `5um`, `-3arcsec`, `0.1deg`.
+//! Lengths, angles and times of the command line, each with its unit: `5um`, `-3arcsec`, `0.1deg`.
 //!
 //! A number without unit is refused, because it has two likely readings. Zero needs no unit.
 
 use hexad_machine::text::excerpt::stranger;
-use hexad_machine::text::units::{ANGLES, LENGTHS, Units, in_letters};
+use hexad_machine::text::units::{ANGLES, LENGTHS, TIMES, Units, in_letters, names};
 
 /// Bounds of a length and of an angle, larger than any machine.
 const LENGTH_BOUNDS: [&str; 2] = ["-1e6m", "1e6m"];
@@ -23,6 +23,12 @@ struct Quantity {
 
 const LENGTH: Quantity = Quantity { noun: "a length", units: LENGTHS, likely: ["mm", "m"] };
 const ANGLE: Quantity = Quantity { noun: "an angle", units: ANGLES, likely: ["deg", "rad"] };
+const TIME: Quantity = Quantity { noun: "a time", units: TIMES, likely: ["ms", "s"] };
+
+/// Time \[s\] within bounds, which are written as the time is.
+pub fn time_within(text: &str, bounds: [&str; 2]) -> Result<f64, String> {
+    TIME.read(text, bounds)
+}
 
 /// Length \[m\].
 pub fn length(text: &str) -> Result<f64, String> {
@@ -67,8 +73,7 @@ impl Quantity {
                 Err(format!("has no unit: say {text}{likely} or {text}{other}"))
             }
             None => {
-                let units: Vec<_> = self.units.iter().map(|(unit, _)| *unit).collect();
-                let (units, stranger) = (units.join(", "), stranger(text));
+                let (units, stranger) = (names(self.units), stranger(text));
                 Err(format!("must be {} in {units}, for example 5{likely}{stranger}", self.noun))
             }
         }

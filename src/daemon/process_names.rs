@@ -4,16 +4,23 @@ use std::fs;
 
 use hexad_core::control::signals::diagnostic::{Comparison, Diagnostic};
 
+/// Command and state of a process; `None` if it has ended.
+fn command_and_state(process_id: u32) -> Option<(String, char)> {
+    let stat = fs::read_to_string(format!("/proc/{process_id}/stat")).ok()?;
+    let (before, state) = stat.rsplit_once(") ")?;
+    let (_, command) = before.split_once('(')?;
+    // A process that has ended is listed until its parent has waited for it.
+    Some((command.to_owned(), state.chars().next()?)).filter(|(_, state)| *state != 'Z')
+}
+
 /// Command of a process; empty if it has ended.
 pub fn command(process_id: u32) -> String {
-    let stat = fs::read_to_string(format!("/proc/{process_id}/stat")).unwrap_or_default();
-    let command = || {
-        let (before, state) = stat.rsplit_once(") ")?;
-        let (_, command) = before.split_once('(')?;
-        // A process that has ended is listed until its parent has waited for it.
-        (!state.starts_with('Z')).then(|| command.into())
-    };
-    command().unwrap_or_default()
+    command_and_state(process_id).map(|(command, _)| command).unwrap_or_default()
+}
+
+/// Whether a process lives and runs no more, by SIGSTOP or a debugger. It obeys neither SIGINT nor SIGTERM.
+pub fn is_stopped(process_id: u32) -> bool {
+    command_and_state(process_id).is_some_and(|(_, state)| matches!(state, 'T' | 't'))
 }
 
 /// Sentence of a diagnostic, with processes named by command and number.
@@ -30,6 +37,9 @@ pub fn sentence(diagnostic: &Diagnostic) -> String {
 pub fn named(process_id: u32) -> String {
     match command(process_id).as_str() {
         "" => format!("process {process_id} (ended)"),
+        command if is_stopped(process_id) => format!(
+            "process {process_id} ({command}, stopped by SIGSTOP or a debugger: only kill -KILL {process_id} ends it)"
+        ),
         command => format!("process {process_id} ({command})"),
     }
 }
@@ -49,6 +59,22 @@ mod tests {
         }
         assert!(fs::exists(format!("/proc/{}/stat", child.id())).unwrap(), "it is listed");
         child.wait().unwrap();
+    }
+
+    #[test]
+    fn a_stopped_process_is_named_as_one() {
+        let mut child = std::process::Command::new("sleep").arg("60").spawn().unwrap();
+        let pid = nix::unistd::Pid::from_raw(child.id().cast_signed());
+        assert!(!is_stopped(child.id()));
+        nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGSTOP).unwrap();
+        let began = std::time::Instant::now();
+        while !named(child.id()).contains("stopped by SIGSTOP") {
+            assert!(began.elapsed().as_secs() < 60, "{}", named(child.id()));
+            std::thread::yield_now();
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(!is_stopped(child.id()) && named(child.id()).ends_with("(ended)"));
     }
 
     #[test]

@@ -38,4 +38,14 @@ fn a_damaged_recording_is_told_and_its_rest_is_recovered() {
         assert_eq!(code, Some(0), "{command}: {errors}");
         has(&errors, &["/cut.mcap: it is not complete (", "hexad recover completes it"]);
     }
+    // A part is unfinished if it has the end; completing the file does not change that.
+    folder.execute("recover @/cut.mcap --output @/completed.mcap").unwrap();
+    let parts = [("0..0.001", "recording</title>"), ("0..99", "recording, unfinished</title>")];
+    for (file, (part, title)) in
+        ["cut", "completed"].into_iter().flat_map(|file| parts.map(|part| (file, part)))
+    {
+        folder.execute(&format!("replay @/{file}.mcap --extract {part} --output @/part.mcap")).unwrap();
+        folder.execute("report @/part.mcap --output @/part.html").unwrap();
+        assert!(folder.read("part.html").contains(title), "{file} {part}: {title}");
+    }
 }

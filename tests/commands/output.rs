@@ -37,7 +37,17 @@ fn json(text: &str) -> Value {
 fn a_check_shows_the_machine_and_draws_it() {
     let folder = Folder::new("");
     let text = folder.says("check @M --drawing @/machine.svg");
-    has(&text, &[&format!("{}: valid", name()), "length", "force", "6 is best", "gain margin"]);
+    has(
+        &text,
+        &[
+            &format!("{}: valid", name()),
+            "length",
+            "force",
+            "6 is best",
+            "gain margin",
+            "\nin position  within ",
+        ],
+    );
     assert_eq!(text.matches(" deg\n").count(), 6, "a line for each leg:\n{text}");
     assert!(!text.contains("WARNING"), "no other pose is near, and no loop is bold:\n{text}");
     let words = ["from above", "from the side", "in perspective", "x [m]", "y [m]", "z [m]"];
@@ -51,6 +61,7 @@ fn a_check_shows_the_machine_and_draws_it() {
     let condition = sound["condition"].as_f64().unwrap();
     assert!((6.0..20.0).contains(&condition), "{condition}: 6 is best");
     assert_eq!(sound["loops"][0]["name"], "position");
+    assert_eq!(sound["tolerances"]["settling_s"], 0.1);
     let (code, text, _) = weak().run("check @M --json");
     let found = json(&text);
     assert_eq!((code, &found["schema"], &found["machine"]), (Some(2), &1.into(), &name().into()));
@@ -189,12 +200,18 @@ fn a_small_step_is_seen() {
             shown.lines().find(|line| line.starts_with("to ")).unwrap().split_whitespace().collect();
         assert_eq!([to[1], to[6]], [alpha, z], "{name}: {shown}");
     }
+    // In the units of a person.
+    folder.write("machine.toml", fs::read(data("piezo", "toml")).unwrap());
+    let shown = folder.says("goto @M --relative --z 5nm --alpha 0.3arcsec --dry-run --units nm,arcsec");
+    let words = shown.split_whitespace().collect::<Vec<_>>().join(" ");
+    has(&words, &["alpha arcsec beta arcsec", "y nm z nm", "to 0.300 0.000 0.000 0 0 135000005 from is"]);
 }
 
 #[test]
 fn coordinates_of_a_tool_are_planned_and_refused() {
     let folder = Folder::new(&[FRAMES, ENVELOPE].concat());
     has(&folder.says("frame list @M"), &["tip", "300.000", "work"]);
+    has(&folder.says("frame list @M --units um,mrad"), &["alpha mrad", "x um", " 300000 "]);
     // Home is x = 1.1 m, the tip 0.3 m beyond it: at the table's origin.
     let plan = folder.says("goto @M --tool tip --work table --gamma 4deg --dry-run");
     has(&plan, &["coordinates of tip in table", "4.000", "the tool goes straight", "from is home"]);

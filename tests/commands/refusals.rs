@@ -48,6 +48,15 @@ fn what_is_typed_wrong_is_refused() {
         ("goto @M --table @/T.csv --output /dev/null --resume", ["--output must be a regular file", ""]),
         ("goto @M --table @/machine.toml --output o.csv", ["missing columns alpha, beta, gamma", ""]),
         ("goto @M --x 1mm --resume", [ABSENT, "--table <FILE>"]),
+        (
+            "goto @M --home --units nm",
+            ["must be a unit of length (m, mm, um, nm) and one of angle (rad,", ""],
+        ),
+        ("status --units nm,arcsec", ["--units: name the machine", ""]),
+        ("status @M --units nm,arcsec --json", ["cannot be used with", "--json"]),
+        ("convert @/run.mcap --csv @/run.csv --units nm,deg", ["--tool <NAME>|--work <NAME>", ""]),
+        ("convert @/run.mcap --csv @/run.csv --every 0", ["must be a number of cycles, at least 1,", ""]),
+        ("convert @/run.mcap --csv @/run.csv --every 1.5", ["as 10 or 10ms", ""]),
         ("move @M --udp 127.0.0.1:4123 --tool tip", ["must go with --trajectory", ""]),
     ] {
         folder.refuses(line, &words);

@@ -1,14 +1,16 @@
 //! Files of numbers as spreadsheets and scripts write them: units, semicolons, decimal commas, poses alone, standard input.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::File;
+use std::fs::{self, File};
 use std::process::{Command, Stdio};
 
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::commands::orientation::OrientationFormat;
 use hexad::config::coordinates::Coordinates;
 use hexad::motion::minimum_jerk::rise;
-use hexad::text::csv_table::trajectory_columns;
+use hexad::text::csv_table::{legs, trajectory_columns};
+use hexad_support::data;
 
 use super::{Folder, largest_difference, numbers, table};
 
@@ -111,4 +113,85 @@ fn tables_go_through_pipes() {
     // The lengths of one are the input of the other.
     piped("forward-kinematics", &reference, "t,alpha,beta,gamma,x,");
     assert!(!folder.path("-").exists(), "a file called -");
+}
+
+/// Columns of a table by name, each as text.
+fn columns(text: &str) -> BTreeMap<&str, Vec<&str>> {
+    let mut lines = text.lines().map(|line| line.split(','));
+    let header = lines.next().unwrap();
+    let rows: Vec<Vec<_>> = lines.map(Iterator::collect).collect();
+    header.enumerate().map(|(k, name)| (name, rows.iter().map(|row| row[k]).collect())).collect()
+}
+
+/// The command line that makes a table of a recording: 180 cycles of 1 ms of a machine without frames. Frames are in the machine file,
+/// as on the day after a run.
+fn convert(options: &str) -> String {
+    format!("convert {} --csv @/run.csv{options}", data("hexad-2026-11-25", "mcap").display())
+}
+
+fn converted(folder: &Folder, options: &str) -> String {
+    folder.execute(&convert(options)).unwrap();
+    folder.read("run.csv")
+}
+
+#[test]
+fn a_part_of_a_recording_has_the_numbers_of_the_whole() {
+    let folder = Folder::new("");
+    let whole = converted(&folder, "");
+    assert!(converted(&folder, " --every 1") == whole);
+    let (all, lengths) = (columns(&whole), legs("measured_length").join(","));
+    for (options, header, step) in [
+        (" --every 50 --columns state,t", "t,state".into(), 50),
+        (" --every 50ms --columns t,condition", "t,condition".into(), 50),
+        (
+            " --every 1us --columns measured_rates_valid,measured_length,t",
+            format!("t,{lengths},measured_rates_valid"),
+            1,
+        ),
+        (" --columns target_x,t --every 100", "t,target_x".into(), 100),
+    ] {
+        let text = converted(&folder, options);
+        assert_eq!(text.lines().next(), Some(&*header), "{options}");
+        for (name, part) in columns(&text) {
+            let rows = 180_usize.div_ceil(step);
+            let expected =
+                all.get(name).map_or(vec!["NaN"; rows], |all| all.iter().step_by(step).copied().collect());
+            assert_eq!(part, expected, "{options}: {name}");
+        }
+    }
+    let message = folder.says(&convert(" --every 10ms"));
+    assert!(message.ends_with("run.csv: 18 rows of 180 cycles\n"), "{message}");
+    fs::remove_file(folder.path("run.csv")).unwrap();
+    let words =
+        ["lenght: no such column or group, probably measured_length", "target: no cycle", " has cycle, t, "];
+    folder.refuses(&convert(" --columns t,lenght,target"), &words);
+    folder.refuses(&convert(" --tool tip"), &["no tool frame \"tip\""]);
+    assert!(!folder.path("run.csv").exists());
+}
+
+#[test]
+fn a_recording_is_shown_in_the_coordinates_of_a_tool() {
+    let folder = Folder::new(include_str!("frames.toml"));
+    let frames = " --tool tip --work table --config @/machine.toml";
+    let [whole, si, text] =
+        ["", frames, &format!("{frames} --units nm,arcsec")].map(|options| converted(&folder, options));
+    let [all, si, found] = [&whole, &si, &text].map(|text| columns(text));
+    assert!(all.iter().all(|(name, numbers)| found[name] == *numbers), "every other column stays");
+    let number = |name: &str, row: usize| found[name][row].parse::<f64>().unwrap();
+    for row in [50, 170] {
+        for group in ["reference", "estimated"] {
+            // The second coordinate of the tip, 0.3 m along x of the platform; the axes of the table are those of the base.
+            let [alpha, beta, gamma, y, t] =
+                ["alpha", "beta", "gamma", "y", "t"].map(|name| number(&format!("{group}_{name}"), row));
+            let y = y + 0.3 * (alpha.cos() * gamma.sin() + alpha.sin() * beta.sin() * gamma.cos());
+            for (name, expected) in [("y_nm", 1e9 * y), ("beta_arcsec", 3600.0 * beta.to_degrees()), ("t", t)]
+            {
+                let shown = number(&format!("tool_{group}_{name}"), row);
+                assert!((shown - expected).abs() < 1e-3, "{row} {group} {name}: {shown} {expected}");
+            }
+            let y_m: f64 = si[&*format!("tool_{group}_y")][row].parse().unwrap();
+            assert!((y - y_m).abs() < 1e-12, "{y} {y_m}");
+        }
+    }
+    assert_eq!((found["tool_reference_x_nm"][0], found["reference_x"][0]), ("NaN", "NaN"));
 }

@@ -31,7 +31,7 @@ fn every_line_has_its_answer() {
         ),
         (
             "{\"version\": 1, \"request\": \"dance\"}\n",
-            "unknown request \"dance\"; must be one of status, record, reload, goto, hold, jog, engage, clear, park, stop, off, estop",
+            "unknown request \"dance\"; must be one of status, record, reload, goto, hold, jog, ride_start, ride_end, engage, clear, park, stop, off, estop",
         ),
         ("{\"version\": 1, \"request\": \"engage\", \"wiat\": true}\n", "unknown field `wiat`"),
         ("{\"version\": 1, \"request\": \"record\"}\n", "record needs an open file"),

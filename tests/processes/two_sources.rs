@@ -113,6 +113,28 @@ fn a_second_setpoint_source_never_takes_over_and_control_does_not_begin_with_two
     plant.stops();
 }
 
+/// It is silent, and applies the same forces as the other when it goes on.
+#[test]
+#[apply(beside_others)]
+fn control_does_not_begin_beside_a_stopped_driver() {
+    let Controlled { peer: _peer, daemon, plant, machine } =
+        Controlled::start(Machine::patient("stopped-driver"));
+    let lengths = lengths_of(&machine, 0.0);
+    plant.hold();
+    daemon.says("fault: measurement lost");
+    clear(&machine);
+    machine.hexad::<&str>("plant", &[]).fails(2, "stopped by SIGSTOP");
+    machine.hexad("status", &[""; 0]).succeeds().find("STOPPED").expect("it is shown");
+    let second = publish(&machine, lengths);
+    let_pass(SILENCE);
+    is_refused(&machine, "engage", &[], &format!("only kill -KILL {} ends it", plant.id()));
+    plant.signal("KILL");
+    let end = || machine.hexad("engage", &["--within", "1"]).stderr;
+    plant.waits(|| !end().contains("two sources of measurements"), "count as one that has ended");
+    drop(second);
+    daemon.stops();
+}
+
 #[test]
 #[apply(beside_others)]
 fn a_plant_does_not_join_where_a_driver_lives() {

@@ -114,7 +114,7 @@ impl SourceClock {
         self.line.as_ref().map(|line| line.rate)
     }
 
-    /// How often the source, or its clock, has begun.
+    /// How often the source has begun. A clock that only stood, as that of a game in its menu, goes on with its stamps.
     pub fn lives(&self) -> u32 {
         self.lives
     }
@@ -146,12 +146,13 @@ impl SourceClock {
             ClockRule::RealTime => Line::new(1.0, REAL_TIME_DRIFT),
             _ => Line::new(rate, MEASURED_DRIFT),
         };
+        let goes_on = self.goes_on();
         // The measured messages give the least delay.
         for [stamp_ns, arrival_ns] in core::mem::take(&mut self.measured) {
             let _ = line.instant(stamp_ns, arrival_ns, i64::MAX);
         }
         line.newest_ns = None;
-        self.lives += 1;
+        self.lives += u32::from(!goes_on);
         self.line.insert(line).instant(stamp_ns, arrival_ns, self.max_age_ns)
     }
 
@@ -164,8 +165,13 @@ impl SourceClock {
     /// The rate before: of a source whose stamps go on, or of real time.
     fn rate_before(&self) -> Option<f64> {
         let line = self.line.as_ref()?;
-        let goes_on = self.measured.first().is_some_and(|[stamp_ns, _]| line.newest_ns <= Some(*stamp_ns));
-        (goes_on || self.rule == ClockRule::RealTime).then_some(line.rate)
+        (self.goes_on() || self.rule == ClockRule::RealTime).then_some(line.rate)
+    }
+
+    /// Whether the stamps of the messages without an instant follow the others.
+    fn goes_on(&self) -> bool {
+        let newest_ns = self.line.as_ref().and_then(|line| line.newest_ns);
+        newest_ns.is_some() && self.measured.first().is_some_and(|[stamp_ns, _]| newest_ns <= Some(*stamp_ns))
     }
 
     /// Adds a message without an instant. The rate, each time that enough of a steady stream was added.

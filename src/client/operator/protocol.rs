@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion_fields::{FrameField, RateFields, TargetFields};
 use super::ride::RidePhase;
-use super::status_report::{StatusReport, StopNumber};
+use super::status_report::{StatusReport, StopNumber, is_false};
 use hexad_core::control::signals::state::Request;
 
 /// Whether a request ends control or force. Such a request is never withdrawn.
@@ -104,11 +104,6 @@ pub struct RequestLine {
     /// Rates of `jog`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate: Option<RateFields>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 fn default_within_s() -> f64 {

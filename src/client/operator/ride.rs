@@ -21,6 +21,19 @@ pub enum RidePhase {
     Paused,
 }
 
+impl RidePhase {
+    /// Name of the phase, as in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Boarding => "boarding",
+            Self::Ready => "ready",
+            Self::Doubtful => "doubtful",
+            Self::Riding => "riding",
+            Self::Paused => "paused",
+        }
+    }
+}
+
 /// What the operator wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

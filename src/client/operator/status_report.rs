@@ -120,6 +120,11 @@ pub struct LegReport {
     pub force_n: f64,
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+pub(super) fn is_false(value: &bool) -> bool {
+    !value
+}
+
 /// JSON has no NaN.
 fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Option::deserialize(deserializer).map(|number| number.unwrap_or(f64::NAN))
@@ -151,6 +156,9 @@ pub struct ProcessReport {
     /// Whether its messages are ignored, because another process is used.
     #[serde(default)]
     pub is_ignored: bool,
+    /// Whether it lives and runs no more, by SIGSTOP or a debugger: it obeys neither SIGINT nor SIGTERM.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_stopped: bool,
     /// What it says of its own input, as of datagrams that it did not follow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,

@@ -8,6 +8,11 @@ use std::io;
 use std::sync::Arc;
 use std::thread;
 
+use crate::messages::clock::monotonic_ns;
+
+/// Least time between two signals that are two requests: `timeout`, a terminal and a supervisor each signal a process and its group.
+const REPEAT_INTERVAL_NS: u64 = 200_000_000;
+
 /// Stop request of this process: a count of its signals.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicU32>);
@@ -18,8 +23,13 @@ impl Stop {
         let stop = Self::default();
         let flag = stop.clone();
         let main = thread::current();
+        let mut last_ns = None;
         ctrlc::set_handler(move || {
-            flag.0.fetch_add(1, Ordering::Relaxed);
+            let now_ns = monotonic_ns();
+            if last_ns.is_none_or(|last_ns| now_ns - last_ns > REPEAT_INTERVAL_NS) {
+                last_ns = Some(now_ns);
+                flag.0.fetch_add(1, Ordering::Relaxed);
+            }
             main.unpark();
         })?;
         Ok(stop)

@@ -1,4 +1,4 @@
-//! Limits of all motions, and ranges of `[envelope]` below them, which the reference does not keep.
+//! Limits of all motions, ranges of `[envelope]` below them, which the reference does not keep, and tolerances.
 
 use core::fmt;
 
@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use hexad_core::control::signals::limits::{DerivativeLimits, Limits};
 use hexad_machine::analysis::envelope::EnvelopeBounds;
-use hexad_machine::config::deployment::DeploymentLimits;
-use hexad_machine::text::numbers::significant;
+use hexad_machine::config::deployment::{Deployment, DeploymentLimits};
+use hexad_machine::text::numbers::{readable, significant};
+use hexad_machine::text::units::{ANGLES, LENGTHS, TIMES};
 
 /// Largest velocity, acceleration and jerk of all motions: `[limits]` times `limits.scale`.
 #[derive(Clone, Debug, Serialize)]
@@ -48,6 +49,71 @@ impl fmt::Display for MotionLimits {
             "motions      at most {v} m/s, {a} m/s^2, {j} m/s^3; {omega} rad/s, {alpha} rad/s^2, {jerk} rad/s^3"
         )?;
         write!(f, " ([limits] times limits.scale = {})", self.scale)
+    }
+}
+
+/// Tolerances of errors and ages, many of which are defaults by the machine.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tolerances {
+    /// `[in_position]`: how near to a setpoint that does not change the platform has arrived, after the settling time.
+    pub in_position_m: f64,
+    pub in_position_rad: f64,
+    pub settling_s: f64,
+    /// `control.engage_*`: how near to the setpoint control begins.
+    pub engage_position_m: f64,
+    pub engage_orientation_rad: f64,
+    /// `control.following_*`: the largest errors under control.
+    pub following_position_m: f64,
+    pub following_orientation_rad: f64,
+    pub following_velocity_m_s: f64,
+    pub following_velocity_rad_s: f64,
+    /// `[timeouts]`: the largest ages.
+    pub setpoint_age_s: f64,
+    pub measured_age_s: f64,
+}
+
+impl Tolerances {
+    /// Tolerances of a deployment.
+    pub fn new(deployment: &Deployment) -> Self {
+        let Deployment { control, timeouts, in_position, .. } = deployment;
+        Self {
+            in_position_m: in_position.tolerance_m,
+            in_position_rad: in_position.tolerance_rad,
+            settling_s: in_position.settling_ns as f64 / 1e9,
+            engage_position_m: control.engage_position_m,
+            engage_orientation_rad: control.engage_orientation_rad,
+            following_position_m: control.following_position_m,
+            following_orientation_rad: control.following_orientation_rad,
+            following_velocity_m_s: control.following_velocity_m_s,
+            following_velocity_rad_s: control.following_velocity_rad_s,
+            setpoint_age_s: timeouts.setpoint_s,
+            measured_age_s: timeouts.measured_s,
+        }
+    }
+}
+
+impl fmt::Display for Tolerances {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [near, engage, following, velocity] = [
+            (self.in_position_m, self.in_position_rad),
+            (self.engage_position_m, self.engage_orientation_rad),
+            (self.following_position_m, self.following_orientation_rad),
+            (self.following_velocity_m_s, self.following_velocity_rad_s),
+        ]
+        .map(|(linear, angular)| [readable(linear, LENGTHS), readable(angular, ANGLES)]);
+        let times = [self.settling_s, self.setpoint_age_s, self.measured_age_s];
+        let [settling, setpoint, measured] = times.map(|time_s| readable(time_s, TIMES));
+        write!(
+            f,
+            "in position  within {} of a setpoint that does not change, for {settling} ([in_position])\n\
+             engage       within {} of the setpoint (control.engage_*)\n\
+             following    errors up to {}, {}/s (control.following_*)\n\
+             messages     setpoints up to {setpoint} old, measurements up to {measured} ([timeouts])",
+            near.join(" and "),
+            engage.join(" and "),
+            following.join(" and "),
+            velocity.join("/s and "),
+        )
     }
 }
 
@@ -97,6 +163,19 @@ pub fn exceedable_ranges(envelope: &EnvelopeBounds, limits: &Limits) -> Vec<Exce
 mod tests {
     use super::*;
     use hexad_machine::config::Config;
+
+    #[test]
+    fn tolerances_are_shown_as_they_are_in_force() {
+        let telescope = include_str!("../../../tests/data/telescope_m2.toml");
+        let stated = "[in_position]\ntolerance_m = 3e-7\ntolerance_rad = 2e-6\nsettling_ms = 250\n";
+        let config = Config::parse(&format!("{telescope}\n{stated}"), "a test").unwrap();
+        let shown = Tolerances::new(&config.deployment).to_string();
+        let words = "in position  within 300 nm and 2.00 urad of a setpoint that does not change, for 250 ms ([in_position])\n\
+                     engage       within 2.00 mm and 5.00 mrad of the setpoint (control.engage_*)\n\
+                     following    errors up to 20.0 mm and 50.0 mrad, 201 mm/s and 229 mrad/s (control.following_*)\n\
+                     messages     setpoints up to 50.0 ms old, measurements up to 20.0 ms ([timeouts])";
+        assert_eq!(shown, words);
+    }
 
     #[test]
     fn ranges_below_the_scaled_limits_are_shown_with_the_key_to_change() {

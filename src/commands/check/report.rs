@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::limits::{ExceedableRange, MotionLimits, exceedable_ranges};
+use super::limits::{ExceedableRange, MotionLimits, Tolerances, exceedable_ranges};
 use hexad_core::control::constants::Constants;
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::inverse_dynamics;
@@ -50,6 +50,8 @@ pub struct CheckReport {
     pub motion_limits: MotionLimits,
     /// Ranges of `[envelope]` that are below them.
     pub exceedable_ranges: Vec<ExceedableRange>,
+    /// Largest errors and ages.
+    pub tolerances: Tolerances,
     /// Default limits that are less than usual, because the drives cannot give more.
     pub derived_limits: Vec<DerivedLimit>,
     pub control_mode: &'static str,
@@ -144,6 +146,7 @@ impl CheckReport {
             exceedable_ranges: deployment
                 .envelope
                 .map_or_else(Vec::new, |envelope| exceedable_ranges(&envelope, &limits.in_force())),
+            tolerances: Tolerances::new(deployment),
             derived_limits: derived_limits(machine, &limits.reference),
             control_mode: control.mode.name(),
             estimator_hz: control.estimator_bandwidth_hz,

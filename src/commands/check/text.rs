@@ -37,6 +37,7 @@ impl fmt::Display for CheckReport {
         writeln!(f, "{}", self.motion_limits)?;
         self.derived_limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
         self.exceedable_ranges.iter().try_for_each(|range| writeln!(f, "{range}"))?;
+        writeln!(f, "{}", self.tolerances)?;
         self.warnings.iter().try_for_each(|warning| writeln!(f, "WARNING: {warning}"))
     }
 }

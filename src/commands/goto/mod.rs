@@ -11,7 +11,7 @@ use self::pose_options::PoseOptions;
 use self::table::TableOptions;
 use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
-use super::frame_options::FrameOptions;
+use super::frame_options::{FrameOptions, UnitOptions};
 use super::motion_client::MotionClient;
 use super::quantity::length_within;
 use hexad_client::operator::motion_fields::{GOTO, TargetFields};
@@ -23,9 +23,8 @@ use hexad_daemon::motion_requests::order::GotoOrder;
 use hexad_daemon::motion_requests::plan::{GotoPlan, window};
 use hexad_daemon::target_source::Observation;
 use hexad_machine::config::Config;
-use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
 use hexad_machine::text::files::print;
-use hexad_machine::text::numbers::MotionDigits;
 
 mod plan;
 mod pose_options;
@@ -40,6 +39,8 @@ pub struct GotoArguments {
     target: PoseOptions,
     #[command(flatten)]
     frames: FrameOptions,
+    #[command(flatten)]
+    units: UnitOptions,
     /// Add the coordinates to the target that is held, or to the present pose if no target is held
     #[arg(long)]
     relative: bool,
@@ -91,7 +92,8 @@ impl GotoArguments {
         let AnswerLine { status, .. } = client.status_under_control()?;
         let report = status.unwrap_or_default();
         let pose = coordinates.tool_x(&report.pose.unwrap_or_default());
-        let pose = heading(&coordinates.label) + &row("pose", &pose, MotionDigits::new(report.resolution));
+        let format = CoordinateFormat::new(self.units.units(), report.resolution);
+        let pose = format.table(&coordinates.label, &[("pose", Some(pose), 0)]);
         let _ = print(format_args!("{}\n{pose}", arrived.text));
         Ok(())
     }
@@ -131,7 +133,8 @@ impl GotoArguments {
             window: &window(config, self.tolerance),
             constants: &constants,
             coordinates: &coordinates,
-            digits: MotionDigits::new(config.resolution()),
+            units: self.units.units(),
+            resolution: config.resolution(),
             origin,
             speed: self.speed,
         })?)

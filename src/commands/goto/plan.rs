@@ -8,8 +8,9 @@ use hexad_core::control::supervision::in_position::InPositionWindow;
 use hexad_core::model::LEGS;
 use hexad_daemon::motion_requests::plan::GotoPlan;
 use hexad_machine::config::coordinates::Coordinates;
-use hexad_machine::text::coordinate_rows::{heading, row};
-use hexad_machine::text::numbers::{MotionDigits, fixed, percent, significant};
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
+use hexad_machine::text::numbers::{MotionDigits, fixed, percent, readable, significant};
+use hexad_machine::text::units::{ANGLES, LENGTHS, MotionUnits};
 
 /// Plan as text.
 pub struct PlanText<'a> {
@@ -17,28 +18,29 @@ pub struct PlanText<'a> {
     pub window: &'a InPositionWindow,
     pub constants: &'a Constants,
     pub coordinates: &'a Coordinates,
-    pub digits: MotionDigits,
+    pub units: MotionUnits,
+    pub resolution: [f64; 2],
     pub origin: &'static str,
     pub speed: f64,
 }
 
 impl fmt::Display for PlanText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { plan, constants, coordinates, digits, window, origin, speed } = self;
+        let Self { plan, constants, coordinates, units, resolution, window, origin, speed } = self;
         let GotoPlan { from, to, motion, stream } = plan;
         let Constants { parameters, .. } = constants;
         let actuator = &constants.machine().actuator;
-        let rows =
-            row("from", &coordinates.tool_x(from), *digits) + &row("to", &coordinates.tool_x(to), *digits);
-        let digits = digits.mm;
-        writeln!(f, "{}{rows}from is {origin}", heading(&coordinates.label))?;
+        let rows = [("from", from), ("to", to)].map(|(name, x)| (name, Some(coordinates.tool_x(x)), 0));
+        let rows = CoordinateFormat::new(*units, *resolution).table(&coordinates.label, &rows);
+        let digits = MotionDigits::new(*resolution).mm;
+        writeln!(f, "{rows}from is {origin}")?;
         writeln!(
             f,
-            "duration  {:.3} s, then {:.3} s in position within {} mm and {} mrad",
+            "duration  {:.3} s, then {:.3} s in position within {} and {}",
             motion.duration_s,
             window.settling_ns as f64 * 1e-9,
-            significant(1e3 * window.tolerance_m),
-            significant(1e3 * window.tolerance_rad)
+            readable(window.tolerance_m, LENGTHS),
+            readable(window.tolerance_rad, ANGLES)
         )?;
         writeln!(
             f,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::report::{IdentificationReport, Row};
 use crate::commands::report::head::{LevelHead, json};
-use crate::commands::report::summary::Fact;
+use crate::commands::report::summary::{Fact, plain_text};
 use crate::output::page::{PageKind, page};
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::Machine;
@@ -83,6 +83,8 @@ pub(super) fn text(report: &IdentificationReport, machines: [&Machine; 2], predi
         let text = format!("the first {length_s:.0} s of {total_s:.0} s");
         facts.push(Fact { name: "Shown", text, is_bad: false });
     }
+    let title = format!("{}: identification", report.machine());
+    let summary = plain_text(&title, &facts);
     let correlated = report.residual_cells().into_iter().zip(report.correlation());
     let head = json(&Head {
         name: report.machine(),
@@ -98,7 +100,7 @@ pub(super) fn text(report: &IdentificationReport, machines: [&Machine; 2], predi
         column_count: COLUMNS,
         levels,
     });
-    page(PageKind::Identification, &format!("{}: identification", report.machine()), &head, &samples)
+    page(PageKind::Identification, &title, &summary, &head, &samples)
 }
 
 /// Samples of a run, column by column, on a grid of equal steps.

@@ -4,12 +4,11 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Key {
     /// Moves a coordinate of X, counted from 0, up or down.
-    Move {
-        axis: usize,
-        sign: f64,
-    },
-    Faster,
-    Slower,
+    Move { axis: usize, sign: f64 },
+    /// Changes velocity or step of x, y and z.
+    Translation { is_faster: bool },
+    /// Changes velocity or step of the angles.
+    Rotation { is_faster: bool },
     /// Switches between continuous motion and steps.
     Mode,
     /// Ends the motion. Any key without another meaning does the same.
@@ -41,8 +40,9 @@ fn key(byte: u8) -> Key {
         (up.contains(&byte) || down.contains(&byte)).then_some(Key::Move { axis, sign })
     });
     moves.unwrap_or(match byte {
-        b'+' => Key::Faster,
-        b'-' => Key::Slower,
+        b'+' | b'-' => Key::Translation { is_faster: byte == b'+' },
+        // Without shift on the keyboards of most languages.
+        b'.' | b',' => Key::Rotation { is_faster: byte == b'.' },
         b'm' => Key::Mode,
         b'q' | b'Q' | ESCAPE => Key::Leave,
         _ => Key::Stop,

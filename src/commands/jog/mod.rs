@@ -15,7 +15,7 @@ use self::screen::JogScreen;
 use self::terminal::Terminal;
 use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
-use super::frame_options::FrameOptions;
+use super::frame_options::{FrameOptions, UnitOptions};
 use super::motion_client::{MotionClient, MotionError};
 use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG, RateFields, TargetFields};
 use hexad_client::operator::protocol::{RequestLine, RequestResult};
@@ -44,6 +44,8 @@ pub struct JogArguments {
     machine: MachineFile,
     #[command(flatten)]
     frames: FrameOptions,
+    #[command(flatten)]
+    units: UnitOptions,
     /// Take control, if the platform is not under control
     #[arg(long)]
     engage: bool,
@@ -65,7 +67,7 @@ impl JogArguments {
         client.carry_out(RequestLine { engage, within_s, ..RequestLine::new(HOLD) }, |_| Ok(()))?;
         let [tool, work] = self.frames.fields(&config)?;
         let line = RequestLine { tool, work, ..RequestLine::new("") };
-        jog(&mut client, &line, JogPace::new(&config), &coordinates, &stop)?;
+        jog(&mut client, &line, JogPace::new(&config, self.units.units()), &coordinates, &stop)?;
         Ok(print("the platform stands under control; hexad stop or park ends it\n")?)
     }
 }
@@ -111,7 +113,7 @@ fn jog(
         }
         if drawn.is_none_or(|drawn| drawn.elapsed() > SCREEN_INTERVAL) {
             let (answer, held) = (client.status_under_control()?, held.map(|(key, _)| key));
-            let screen = JogScreen { answer: &answer, pace: pace.pace(), bound: &bound, coordinates, held };
+            let screen = JogScreen { answer: &answer, pace: &pace, bound: &bound, coordinates, held };
             terminal.draw(&screen.to_string());
             drawn = Some(Instant::now());
         }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::jog_pace::Pace;
+use super::jog_pace::{JogPace, Pace};
 use super::keys::Key;
 use crate::commands::status::screen::{legs, poses};
 use hexad_client::operator::protocol::AnswerLine as Answer;
@@ -12,7 +12,7 @@ use hexad_machine::text::numbers::{AXES, significant};
 /// Content of the screen.
 pub struct JogScreen<'a> {
     pub answer: &'a Answer,
-    pub pace: Pace,
+    pub pace: &'a JogPace,
     /// The bound that stops the motion; empty without one.
     pub bound: &'a str,
     pub coordinates: &'a Coordinates,
@@ -36,22 +36,17 @@ impl fmt::Display for JogScreen<'_> {
         writeln!(f, "{:.80}", format!("limits    {limits}"))?;
         let bound = if bound.is_empty() { "none" } else { bound.lines().next().unwrap_or_default() };
         writeln!(f, "{:.80}", format!("bound     {bound}"))?;
-        poses(f, &coordinates.report(report), &coordinates.label)?;
+        poses(f, &coordinates.report(report), &coordinates.label, pace.units)?;
         legs(f, report)?;
         writeln!(f, "\nup/down   x w/s   y e/d   z r/f   alpha t/g   beta y/h   gamma u/j   leave q")?;
-        let pace = match pace {
-            Pace::Continuous([position, angle]) => format!(
-                "{} mm/s, {} deg/s while a key is held",
-                significant(position * 1e3),
-                significant(angle.to_degrees())
-            ),
-            Pace::Step([position, angle]) => format!(
-                "{} mm, {} deg for each key",
-                significant(position * 1e3),
-                significant(angle.to_degrees())
-            ),
+        let ([position, angle], per, end) = match pace.pace() {
+            Pace::Continuous(velocities) => (velocities, "/s", "while a key is held; m: steps"),
+            Pace::Step(steps) => (steps, "", "for each key; m: continuous"),
         };
-        writeln!(f, "pace +/-  {pace}; m: steps or continuous")?;
+        let in_unit =
+            |x: f64, (unit, factor): (&str, f64)| format!("{} {unit}{per}", significant(x / factor));
+        let [position, angle] = [in_unit(position, pace.units.length), in_unit(angle, pace.units.angle)];
+        writeln!(f, "pace      +/-  {position}   ./,  {angle}   {end}")?;
         let moving = match held {
             Some(Key::Move { axis, sign }) => {
                 format!("{} {}", AXES.get(*axis).unwrap_or(&""), if *sign > 0.0 { "up" } else { "down" })
@@ -66,20 +61,28 @@ impl fmt::Display for JogScreen<'_> {
 mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::commands::jog::jog_pace::JogPace;
     use crate::commands::status::screen::tests::answer;
     use hexad_machine::config::Config;
+    use hexad_machine::text::units::MotionUnits;
 
     #[test]
     fn it_fits_the_smallest_terminal() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
-        let (pace, coordinates) = (JogPace::new(&config).pace(), Coordinates::default());
+        let coordinates = Coordinates::default();
+        let pace = &JogPace::new(&config, MotionUnits::default());
         let held = Some(Key::Move { axis: 5, sign: -1.0 });
         let text = JogScreen { answer: &answer(), pace, bound: "leg 1", coordinates: &coordinates, held }
             .to_string();
         let widest = text.lines().map(|line| line.chars().count()).max();
         assert!(text.lines().count() <= 24 && widest <= Some(80), "{text}");
-        for words in ["STOPPING", "force, force rate, stroke", "moving    z down", "setpoint", "1225.000"] {
+        for words in [
+            "STOPPING",
+            "force, force rate, stroke",
+            "moving    z down",
+            "setpoint",
+            "1225.000",
+            "+/-  20.0 mm/s   ./,  ",
+        ] {
             assert!(text.contains(words), "{words}: {text}");
         }
     }

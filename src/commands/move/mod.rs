@@ -20,7 +20,7 @@ use tracing::info;
 use self::engagement::Engagement;
 use self::playback::{Playback, PlaybackStep};
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
-use self::udp::StreamOptions;
+use self::udp::stream::StreamOptions;
 use super::arguments::{GROUP_HELP, MachineFile, built_in_motion, duration};
 use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
 use super::frame_options::FrameOptions;
@@ -143,6 +143,7 @@ impl MoveArguments {
         if let Some(address) = self.source.udp {
             let stop = Stop::on_signals()?;
             if self.stream.dry_run {
+                config.examine().into_result(&config)?;
                 return Ok(udp::dry_run::run(&config, address, &self.stream, self.seconds, &stop)?);
             }
             return Ok(udp::follow(&config, address, &self.stream, &self.playback, &stop)?);

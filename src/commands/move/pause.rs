@@ -15,7 +15,7 @@ use super::MoveError;
 use hexad_client::operator::protocol::AnswerLine as Answer;
 use hexad_client::operator::requests::status;
 use hexad_client::realtime::pause_signals::{handles_pause, pause_signal};
-use hexad_daemon::process_names::named;
+use hexad_daemon::process_names::{is_stopped, named};
 use hexad_machine::config::Config;
 
 /// Time for which the setpoint must not change to count as at rest.
@@ -57,6 +57,9 @@ fn player(answer: &Answer) -> Result<u32, MoveError> {
     let Some(process) = alive.find(|process| !process.is_ignored) else {
         return Err(MoveError::NoPlayer("no process publishes setpoints".into()));
     };
+    if is_stopped(process.process_id) {
+        return Err(MoveError::NoPlayer(named(process.process_id)));
+    }
     // Without a handler the signal would end the process.
     if is_player(process.process_id) && handles_pause(process.process_id) {
         return Ok(process.process_id);

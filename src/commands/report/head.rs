@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::history::{Bars, History};
 use super::levels::Extent;
+use super::list::{Row, rows};
 use super::run::Run;
 use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
@@ -44,15 +45,23 @@ struct Head<'a> {
 /// Facts, intervals and distributions of a run.
 #[derive(Serialize, Default)]
 pub struct Events<'a> {
+    is_unfinished: bool,
     facts: Vec<Fact>,
     tracks: Vec<&'a Track>,
+    rows: Vec<Row>,
     distributions: Vec<Bars>,
 }
 
 impl<'a> Events<'a> {
     /// Events of a run.
     pub fn new(run: &Run, history: &'a History) -> Self {
-        Self { facts: facts(run), tracks: history.tracks(), distributions: history.distributions() }
+        Self {
+            is_unfinished: history.is_unfinished,
+            facts: facts(run),
+            tracks: history.tracks(),
+            rows: rows(history),
+            distributions: history.distributions(),
+        }
     }
 }
 

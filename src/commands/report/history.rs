@@ -55,6 +55,8 @@ pub struct History {
     pub cycles: u64,
     /// Number of cycles that are missing in the recording.
     pub lost: u64,
+    /// Whether its last file broke off: what followed the last cycle is unknown.
+    pub is_unfinished: bool,
     /// Faults in the order of time.
     pub faults: Vec<Fault>,
     /// Tracking error of the cycles in state active.
@@ -94,6 +96,7 @@ impl History {
             last: CycleMessage::default(),
             cycles: 0,
             lost: 0,
+            is_unfinished: false,
             faults: vec![],
             tracking: TrackingSum::default(),
             in_state: [0; State::ALL.len()],
@@ -144,6 +147,11 @@ impl History {
     /// Length \[s\].
     pub fn length_s(&self) -> f64 {
         self.seconds(&self.last)
+    }
+
+    /// State in the last cycle.
+    pub fn last_state(&self) -> State {
+        State::from_number(self.last.state).unwrap_or_default()
     }
 
     /// Adds the next cycle. False if it is not later than the previous ones.

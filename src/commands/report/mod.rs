@@ -7,6 +7,7 @@ use clap::Args;
 
 use self::levels::{Extent, Level};
 use self::run::Run;
+use self::summary::{date_and_time, facts, plain_text};
 use super::failure::{CommandError, Failure};
 use crate::output::page::{PageKind, page};
 use hexad_daemon::recording::RecordingError;
@@ -17,6 +18,7 @@ pub mod deadlines;
 pub mod head;
 pub mod history;
 pub mod levels;
+pub mod list;
 pub mod references;
 pub mod run;
 pub mod signals;
@@ -67,8 +69,11 @@ pub fn write(recordings: &[PathBuf], output: &Path) -> Result<String, ReportErro
     let kept = kept(&extents, run.history.span(), run.config());
     let samples: Vec<u8> = levels.iter().flat_map(Level::bytes).collect();
     let head = head::of_recording(&run, &extents, &kept);
-    let title = format!("{}: recording", run.info().name);
-    let text = page(PageKind::Recording, &title, &head, &samples);
+    let ending = if run.history.is_unfinished { ", unfinished" } else { "" };
+    let title = format!("{}: recording{ending}", run.info().name);
+    let begin = date_and_time(run.begin_s());
+    let summary = plain_text(&format!("{title}, from {begin}"), &facts(&run));
+    let text = page(PageKind::Recording, &title, &summary, &head, &samples);
     write_whole(output, text.as_bytes())?;
     let megabytes = text.len() as f64 * 1e-6;
     Ok(format!("{} cycles, {megabytes:.1} MB; {kept}", run.history.cycles))

@@ -78,7 +78,8 @@ impl Run {
             }
             let mut is_begun = false;
             for file in &part.files {
-                Recording::open(file)?.each(|item| {
+                let cycles = history.cycles;
+                let summary = Recording::open(file)?.each(|item| {
                     if let Item::Cycle(cycle) = item
                         && history.add(&cycle)
                         && !core::mem::replace(&mut is_begun, true)
@@ -87,6 +88,13 @@ impl Run {
                         part.first_cycle = cycle.cycle;
                     }
                 })?;
+                // Only the next file of the run shows how it went on; the window of a fault ends by itself.
+                let (is_newer, is_window) = (history.cycles > cycles, summary.fault.is_some());
+                if summary.is_broken_off && (is_newer || !is_window) {
+                    history.is_unfinished = true;
+                } else if is_newer && !is_window {
+                    history.is_unfinished = false;
+                }
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Largest number of intervals of a track. More cannot be seen on a screen.
+/// Largest number of intervals of a track of repeated events. More cannot be seen on a screen.
 const MAX_INTERVALS: usize = 1000;
 
 /// Interval between two instants \[s\].
@@ -40,6 +40,12 @@ impl Track {
         Self { group, name, intervals: vec![], gap, count: 0 }
     }
 
+    /// Whether no interval may be left out or united with one of another kind, however many there are: states, configurations
+    /// and requests, which change seldom.
+    pub fn is_whole(&self) -> bool {
+        matches!(self.group, "state" | "configuration" | "requests")
+    }
+
     /// Adds an interval after all others. `text` is called if a new one begins.
     pub fn add(&mut self, from: f64, to: f64, key: u32, text: impl FnOnce() -> String) {
         self.count += 1;
@@ -47,7 +53,7 @@ impl Track {
             last.to = last.to.max(to);
             return;
         }
-        if self.intervals.len() == MAX_INTERVALS {
+        if self.intervals.len() >= MAX_INTERVALS && !self.is_whole() {
             self.coarsen();
         }
         self.intervals.push(Interval { from, to, key, text: text() });

@@ -11,7 +11,7 @@ use console::Term;
 use self::screen::Screen;
 use super::arguments::OptionalMachineFile;
 use super::failure::Failure;
-use super::frame_options::FrameOptions;
+use super::frame_options::{FrameOptions, UnitOptions};
 use super::request::machine_name;
 use hexad_client::operator::protocol::AnswerLine;
 use hexad_client::operator::requests;
@@ -41,8 +41,10 @@ pub struct StatusArguments {
     watch: bool,
     #[command(flatten)]
     frames: FrameOptions,
+    #[command(flatten)]
+    units: UnitOptions,
     /// Print the daemon's answer as JSON, one line for each; its coordinates describe the platform in the base frame
-    #[arg(long, conflicts_with_all = ["tool", "work"])]
+    #[arg(long, conflicts_with_all = ["tool", "work", "units"])]
     json: bool,
 }
 
@@ -53,6 +55,10 @@ impl StatusArguments {
             None if !self.frames.is_empty() => Err(Failure {
                 exit_code: 2,
                 message: "--tool, --work: name the machine file that has the frames".into(),
+            }),
+            None if !self.units.is_empty() => Err(Failure {
+                exit_code: 2,
+                message: "--units: name the machine whose coordinates are to be shown".into(),
             }),
             None => hosted::show(self.json),
         }
@@ -89,7 +95,7 @@ impl StatusArguments {
             return Ok(print(answer.to_line())?);
         }
         answer.status = answer.status.map(|report| Box::new(coordinates.report(&report)));
-        let text = Screen(&answer, &coordinates.label).to_string();
+        let text = Screen(&answer, &coordinates.label, self.units.units()).to_string();
         if !in_place {
             return Ok(print(text)?);
         }

@@ -5,8 +5,10 @@ use core::fmt;
 use hexad_client::operator::protocol::AnswerLine;
 use hexad_client::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
 use hexad_core::control::signals::state::State;
-use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, fixed, significant};
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
+use hexad_machine::text::numbers::{MotionDigits, fixed, readable, significant};
 use hexad_machine::text::text_table::paragraph;
+use hexad_machine::text::units::{ANGLES, LENGTHS, MotionUnits};
 
 /// Columns of the screen.
 const WIDTH: usize = 80;
@@ -19,12 +21,12 @@ const BAR: usize = 26;
 /// Longest time to a singular pose that is shown \[s\]. The motion will change within a longer one.
 const MAX_TIME_TO_SINGULARITY_S: f64 = 100.0;
 
-/// Status as text for the screen, with a label of the coordinates.
-pub struct Screen<'a>(pub &'a AnswerLine, pub &'a str);
+/// Status as text for the screen, with a label of the coordinates and their units.
+pub struct Screen<'a>(pub &'a AnswerLine, pub &'a str, pub MotionUnits);
 
 impl fmt::Display for Screen<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(answer, label) = self;
+        let Self(answer, label, units) = self;
         let Some(report) = &answer.status else { return writeln!(f, "{}", answer.text) };
         let age = report
             .age_s
@@ -42,13 +44,15 @@ impl fmt::Display for Screen<'_> {
             .iter()
             .try_for_each(|warning| write!(f, "{}", paragraph("warning: ", warning, WIDTH)))?;
         timing(f, report)?;
-        poses(f, report, label)?;
+        poses(f, report, label, *units)?;
         legs(f, report)?;
         singularity(f, report)?;
         report.sources.iter().try_for_each(|source| write!(f, "{}", source_lines(source)))?;
         let inputs =
             report.sources.iter().flat_map(|source| &source.processes).filter_map(|it| it.input.as_ref());
         inputs.map(|input| paragraph("input     ", input, WIDTH)).try_for_each(|text| write!(f, "{text}"))?;
+        let mut rides = report.sources.iter().flat_map(|source| &source.processes).filter_map(|it| it.ride);
+        rides.try_for_each(|phase| writeln!(f, "ride      {}", phase.name()))?;
         writeln!(f, "{}", file_line(&report.configuration))
     }
 }
@@ -58,8 +62,8 @@ fn progress(answer: &AnswerLine, report: &StatusReport) -> String {
     match report.setpoint_distance {
         _ if report.in_position == Some(true) => "in position".into(),
         Some(distance) if answer.state == State::Engaging.name() => {
-            let [mm, mrad] = distance.map(|distance| significant(1e3 * distance));
-            format!("the setpoint is {mm} mm and {mrad} mrad away")
+            let [length, angle] = distance;
+            format!("the setpoint is {} and {} away", readable(length, LENGTHS), readable(angle, ANGLES))
         }
         _ => "no diagnostic".into(),
     }
@@ -95,35 +99,18 @@ fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     )
 }
 
-/// Poses and their error, with a label of the coordinates.
+/// Poses and their error in units, with a label of the coordinates.
 pub(in crate::commands) fn poses(
     f: &mut fmt::Formatter<'_>,
     report: &StatusReport,
     label: &str,
+    units: MotionUnits,
 ) -> fmt::Result {
-    write!(f, "{label}\n{:10}", "")?;
-    for (k, axis) in AXES.iter().enumerate() {
-        write!(f, "{:>11}", format!("{axis} {}", axis_unit(k).1))?;
-    }
-    writeln!(f)?;
-    let digits = MotionDigits::new(report.resolution);
     let error = report.orientation_error_rad.zip(report.position_error_m);
     let error = error.map(|([a, b, c], [x, y, z])| [a, b, c, x, y, z]);
-    for (name, numbers, more) in
-        [("pose", report.pose, 0), ("setpoint", report.setpoint, 0), ("error", error, 1)]
-    {
-        write!(f, "{name:10}")?;
-        match numbers {
-            None => writeln!(f, "{:>11}", "unknown")?,
-            Some(numbers) => {
-                for (k, number) in numbers.iter().enumerate() {
-                    write!(f, "{:>11}", fixed(number * axis_unit(k).0, digits.of_axis(k) + more))?;
-                }
-                writeln!(f)?;
-            }
-        }
-    }
-    writeln!(f)
+    let rows = [("pose", report.pose, 0), ("setpoint", report.setpoint, 0), ("error", error, 1)];
+    let table = CoordinateFormat::new(units, report.resolution).table("", &rows);
+    writeln!(f, "{label}\n{table}")
 }
 
 pub(in crate::commands) fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
@@ -181,7 +168,10 @@ fn source_lines(source: &SourceReport) -> String {
         .map(|process| match process.command.as_str() {
             "" => format!("{} (ended)", process.process_id),
             command if process.is_ignored => format!("ignored: {command} {}", process.process_id),
-            command => format!("{command} {} of {}", process.process_id, process.user),
+            command => {
+                let stopped = if process.is_stopped { " (STOPPED by SIGSTOP or a debugger)" } else { "" };
+                format!("{command} {} of {}{stopped}", process.process_id, process.user)
+            }
         })
         .collect();
     let from = if processes.is_empty() { "no process".into() } else { processes.join(", ") };
@@ -279,7 +269,7 @@ pub(in crate::commands) mod tests {
         let mut answer = answer();
         (answer.diagnostic.code, answer.diagnostic.text) = (113, "of every length ".repeat(20) + "clear it");
         for known in [true, false] {
-            let text = Screen(&answer, "").to_string();
+            let text = Screen(&answer, "", MotionUnits::default()).to_string();
             assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
             let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(words.contains("113 of every length") && words.contains("length clear it"), "{text}");
@@ -293,12 +283,15 @@ pub(in crate::commands) mod tests {
             };
         }
         answer.diagnostic.text = "as long as most are".into();
-        assert!(Screen(&answer, "").to_string().lines().count() <= 24, "fits the smallest terminal");
+        assert!(
+            Screen(&answer, "", MotionUnits::default()).to_string().lines().count() <= 24,
+            "fits the smallest terminal"
+        );
     }
 
     #[test]
     fn numbers_are_in_millimetres_and_degrees_and_bars_in_proportion() {
-        let text = Screen(&answer(), "").to_string();
+        let text = Screen(&answer(), "", MotionUnits::default()).to_string();
         let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
         let pose: Vec<_> = line("pose").split_whitespace().map(String::from).collect();
         assert_eq!(pose, ["pose", "-177.6169", "177.6169", "0.0000", "-1234.568", "1100.000", "0.000"]);
@@ -313,9 +306,17 @@ pub(in crate::commands) mod tests {
         let mut answer = answer();
         (answer.state, answer.diagnostic.code) = ("engaging".into(), 0);
         let words = "\nthe setpoint is 12.3 mm and 1.23 mrad away\n";
-        assert!(Screen(&answer, "").to_string().contains(words), "{}", Screen(&answer, ""));
+        assert!(
+            Screen(&answer, "", MotionUnits::default()).to_string().contains(words),
+            "{}",
+            Screen(&answer, "", MotionUnits::default())
+        );
         answer.status.as_mut().unwrap().in_position = Some(true);
-        assert!(Screen(&answer, "").to_string().contains("\nin position\n"), "{}", Screen(&answer, ""));
+        assert!(
+            Screen(&answer, "", MotionUnits::default()).to_string().contains("\nin position\n"),
+            "{}",
+            Screen(&answer, "", MotionUnits::default())
+        );
     }
 
     #[test]
@@ -326,11 +327,16 @@ pub(in crate::commands) mod tests {
         report.resolution = [1e-9, 1.4e-8];
         report.pose = Some([0.0, 0.0, 1e-6, 0.0, 25e-6, 0.135_012]);
         report.legs = vec![LegReport { length_m: 0.083_351_2, rate_m_s: Some(-0.01), force_n: -250.0 }; 6];
-        let text = Screen(&answer, "").to_string();
+        let text = Screen(&answer, "", MotionUnits::default()).to_string();
         for words in ["0.000057", "0.025000", "135.012000", "83.3037 ", " 83.4037 ", "83.351200", "-10.0000"]
         {
             assert!(text.contains(words), "{words}: {text}");
         }
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        let text = Screen(&answer, "", MotionUnits::read("nm,arcsec").unwrap()).to_string();
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        for words in ["alpha arcsec", "z nm pose 0.000 0.000 0.206 0 25000 135012000 setpoint"] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
     }
 }

@@ -8,6 +8,7 @@ use super::cause_of_silence;
 use crate::commands::report::head::json;
 use crate::commands::report::history::{Bars, History};
 use crate::commands::report::levels::{Extent, Level};
+use crate::commands::report::list::{Row, rows};
 use crate::commands::report::signals::{CycleInstants, Signals};
 use crate::commands::report::summary::{Fact, live_facts};
 use crate::commands::report::track::Track;
@@ -68,6 +69,7 @@ struct Fresh<'a> {
     samples: String,
     facts: Vec<Fact>,
     tracks: Vec<&'a Track>,
+    rows: Vec<Row>,
     distributions: Vec<Bars>,
 }
 
@@ -177,6 +179,7 @@ impl<'a> Live<'a> {
             samples,
             facts: live_facts(self.config, &self.history, &[wakeup_ns, compute_ns], None),
             tracks: self.history.tracks(),
+            rows: rows(&self.history),
             distributions: distributions.map(|(name, times)| Bars { name, times, bars: vec![] }).into(),
         })
     }

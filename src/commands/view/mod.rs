@@ -141,7 +141,7 @@ fn reply(
             let title = format!("{}: live", config.name);
             Some(Reply {
                 kind: "text/html; charset=utf-8",
-                content: page(PageKind::Live, &title, &head::of_live(config, coordinates), &[]),
+                content: page(PageKind::Live, &title, "", &head::of_live(config, coordinates), &[]),
             })
         }
         "/data" => {

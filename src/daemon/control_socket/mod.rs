@@ -348,6 +348,7 @@ impl Server<'_> {
     /// Logs each new reason for rejecting messages of a sender.
     fn log_rejections(&mut self) {
         let snapshot = self.snapshots.read();
+        self.status.note_drivers(snapshot.measured_publishers);
         let found = [snapshot.setpoint_rejection, snapshot.measured_rejection];
         for ((topic, found), logged) in ["setpoint", "measured"].into_iter().zip(found).zip(&mut self.logged)
         {

@@ -9,16 +9,18 @@ use super::connection::Connection;
 use super::order::{Order, PendingOrder, stop_count};
 use super::pending_file::{PendingFile, RECORD};
 use super::reload::RELOAD;
+use super::ride::{PendingRide, answer_to_ride};
 use super::{MAX_WITHIN_S, Server};
 use crate::control_socket::answer::answer_line;
 use crate::leg_confirmation::{IN_ORDER, geometry_sha1};
 use crate::motion_requests::order::MotionOrder;
+use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG};
 use hexad_client::operator::protocol::{AnswerLine, CONFIRM_LEGS, RequestLine, RequestResult, STOPPED};
 use hexad_client::operator::ride::RideOrder;
 use hexad_client::operator::status_report::StopNumber;
-use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::state::Request;
 use hexad_core::model::LEGS;
 
@@ -131,6 +133,59 @@ impl Server<'_> {
         }
     }
 
+    /// Passes an order for a ride to the source, or refuses it. False if the client has left.
+    fn begin_ride(
+        &mut self,
+        connection: &mut Connection,
+        request: OpenRequest,
+        line: &RequestLine,
+        order: RideOrder,
+        snapshot: &Snapshot,
+    ) -> bool {
+        connection.peer.log_request(line);
+        let refused = |reason| answer_to_ride(RequestResult::Refused, order, snapshot, reason);
+        let (rider, stops) = (self.status.rider(self.woke_ns), self.stops());
+        let ride = PendingRide::new(order, line, rider, stops, snapshot, self.woke_ns);
+        let refusal = self.refusal(line, snapshot).or_else(|| {
+            let other = || refused("an order of this connection is in progress".into());
+            connection.ride.as_ref().map(|_| other())
+        });
+        match (refusal, ride) {
+            (None, Ok(ride)) => {
+                let accepted = answer_to_ride(RequestResult::Accepted, order, snapshot, "accepted".into());
+                let accepted = request.progress(accepted);
+                connection.ride = Some((request, ride));
+                accepted.is_none_or(|line| connection.send(&line))
+            }
+            (refusal, ride) => {
+                let answer = refusal.unwrap_or_else(|| refused(ride.err().unwrap_or_default()));
+                connection.peer.log_failure(&answer);
+                connection.answer(request, answer)
+            }
+        }
+    }
+
+    /// Answers the orders for rides that have ended, and shows the others to their sources. An order ends with the connection of who
+    /// gave it.
+    pub(super) fn advance_rides(&mut self) {
+        let (snapshot, now_ns, stops) = (*self.snapshots.read(), self.woke_ns, self.stops());
+        let rider = self.status.rider(now_ns);
+        let status = &mut self.status;
+        let mut orders = vec![];
+        self.connections.retain_mut(|connection| {
+            let Some((request, ride)) = connection.ride.take() else { return true };
+            let input = status.input(ride.source);
+            if let Some(answer) = ride.answer(rider, stops, input, &snapshot, now_ns) {
+                connection.peer.log_failure(&answer);
+                return connection.answer(request, answer);
+            }
+            orders.push((ride.source, ride.order));
+            connection.ride = Some((request, ride));
+            true
+        });
+        status.set_ride_orders(&orders);
+    }
+
     /// Keeps which legs a person has seen; without legs, only compares the geometry. False if the client has left.
     fn confirm_legs(
         &self,
@@ -174,7 +229,7 @@ impl Server<'_> {
 
     /// Answer to a request that would begin control or motion, if the daemon ends, if the request may be old, or if a stop came after
     /// it was asked for.
-    pub(super) fn refusal(&self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
+    pub(super) fn refusal(&mut self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
         let state = snapshot.status.state().unwrap_or_default();
         let answer = |result, code: DiagnosticCode, text: &str| {
             Some(answer_line(result, &line.request, state, &code.into(), text.into()))
@@ -185,6 +240,14 @@ impl Server<'_> {
         }
         if line.stops.is_some_and(|stops_before| stops_before != self.stops()) {
             return answer(RequestResult::Superseded, DiagnosticCode::None, STOPPED);
+        }
+        // A silent one applies forces again when it goes on.
+        if let [one, other, ..] = self.status.drivers()[..] {
+            let is_second = snapshot.measured_publishers.used_pid == other;
+            let [used, ignored] = if is_second { [other, one] } else { [one, other] };
+            let two = Diagnostic::new(DiagnosticCode::TwoMeasuredSources, used.into(), ignored.into());
+            let text = sentence(&two);
+            return Some(answer_line(RequestResult::Refused, &line.request, state, &two, text));
         }
         let text = "the daemon was held and the request may be old; send it again";
         let is_stale = self.woke_ns < self.stale_until_ns;

@@ -1,6 +1,6 @@
 //! Answer to `status`: the newest cycle, in the units of the messages, for panels and `hexad status`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::process;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::control_socket::answer::diagnostic_report;
 use crate::leg_confirmation::LegConfirmation;
-use crate::process_names::{command, sentence};
+use crate::process_names::{command, is_stopped, sentence};
 use crate::recorder::interruption::Interruption;
 use crate::reload::Loaded;
 use crate::snapshot::Snapshot;
@@ -50,6 +50,8 @@ pub struct StatusSource {
     pub stops: Option<StopNumber>,
     /// Topics, opened at the first report; `None` if they cannot be opened: then the processes are unknown.
     topics: Option<Option<Topics>>,
+    /// Processes that have published measurements.
+    drivers: BTreeSet<u32>,
     /// What processes say of themselves.
     pub(super) inputs: BTreeMap<u32, SourceInput>,
 }
@@ -86,7 +88,17 @@ impl StatusSource {
         legs: Option<Arc<LegConfirmation>>,
     ) -> Self {
         let inputs = BTreeMap::new();
-        Self { loaded, reloads: 0, interruption, legs, mover: None, stops: None, topics: None, inputs }
+        Self {
+            loaded,
+            reloads: 0,
+            interruption,
+            legs,
+            mover: None,
+            stops: None,
+            topics: None,
+            drivers: BTreeSet::new(),
+            inputs,
+        }
     }
 
     /// Keeps what a process says of itself with a request for the status, for as long as it publishes setpoints.
@@ -105,6 +117,20 @@ impl StatusSource {
         let is_new = |source: &SourceInput| now_ns.saturating_sub(source.said_ns) < MAX_SILENCE_NS;
         let riders = self.inputs.iter().filter(|(_, source)| is_new(source));
         riders.filter_map(|(process_id, source)| Some((*process_id, source.ride?))).next()
+    }
+
+    /// Notes the processes whose measurements arrive.
+    pub fn note_drivers(&mut self, Publishers { used_pid, ignored_pid }: Publishers) {
+        self.drivers.extend([used_pid, ignored_pid].into_iter().filter(|process_id| *process_id != 0));
+    }
+
+    /// The processes that have published measurements, may do so again, and live, silent or not.
+    pub fn drivers(&mut self) -> Vec<u32> {
+        let topics = self.topics.get_or_insert_with(|| Topics::open(&self.loaded.config));
+        let Some(topics) = topics else { return vec![] };
+        let listed = topics.measured.publisher_process_ids();
+        self.drivers.retain(|process_id| listed.contains(process_id) && !command(*process_id).is_empty());
+        self.drivers.iter().copied().collect()
     }
 
     /// What a source says of its input.
@@ -289,6 +315,7 @@ fn process_report(
         command: command(process_id),
         user: user.unwrap_or_default(),
         is_ignored: publisher == publishers.ignored_pid,
+        is_stopped: is_stopped(process_id),
         input,
         ride,
         ride_order,

@@ -11,8 +11,8 @@ use hexad_machine::analysis::target_motion::{TargetMotion, TargetRefusal, target
 use hexad_machine::analysis::tool_motion::ToolMotion;
 use hexad_machine::config::Config;
 use hexad_machine::config::coordinates::Coordinates;
-use hexad_machine::text::coordinate_rows::{heading, row};
-use hexad_machine::text::numbers::MotionDigits;
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
+use hexad_machine::text::units::MotionUnits;
 
 /// Motion to a target.
 #[derive(Clone, Debug)]
@@ -77,9 +77,9 @@ pub fn window(config: &Config, wanted_m: Option<f64>) -> InPositionWindow {
 
 /// X of the platform in the base frame and of the tool in the work frame, below a refusal, whose bounds are of the first.
 fn both_coordinates(config: &Config, coordinates: &Coordinates, platform: &[f64; 6]) -> String {
-    let digits = MotionDigits::new(config.resolution());
-    let tool = heading(&coordinates.label) + &row("target", &coordinates.tool_x(platform), digits);
-    let text =
-        heading("coordinates of the platform in the base frame") + &row("target", platform, digits) + &tool;
+    let format = CoordinateFormat::new(MotionUnits::default(), config.resolution());
+    let table = |label: &str, x: [f64; 6]| format.table(label, &[("target", Some(x), 0)]);
+    let text = table("coordinates of the platform in the base frame", *platform)
+        + &table(&coordinates.label, coordinates.tool_x(platform));
     text.trim_end().into()
 }

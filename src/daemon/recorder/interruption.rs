@@ -58,8 +58,8 @@ impl Interruption {
         let (folder, free) = (self.folder.display(), self.free_text());
         let lasted_s = seconds(since_ns, now_ns);
         Some(format!(
-            "the recording in {folder} has been interrupted for {lasted_s:.0} s, with {free}: make room, and it goes on by itself; \
-             the log has the cause"
+            "the recording in {folder} has been interrupted for {lasted_s:.0} s, with {free}: make room for the 30 s in \
+             memory and what follows (docs/recording.md, Size), and it goes on by itself; the log has the cause"
         ))
     }
 }

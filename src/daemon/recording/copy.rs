@@ -10,7 +10,7 @@ use mcap::{McapError, Writer};
 
 use super::file::{on, options};
 use super::reader::{Recording, item};
-use super::{GAP, Item, RecordingError};
+use super::{GAP, Item, RECOVERED, RecordingError};
 use hexad_client::messages::cdr::CdrWriter;
 use hexad_client::messages::layout::Declared as _;
 use hexad_client::messages::{CycleMessage, GapMessage};
@@ -34,12 +34,18 @@ fn copy_to(recording: &Recording, to: &Path, times_ns: RangeInclusive<u64>) -> R
     let file = File::create(to).map_err(FileError::on(to))?;
     let mut writer = options().create(file).map_err(on(to))?;
     let (mut messages, mut topics, mut gap) = (0, BTreeMap::new(), None);
-    recording.each_record(|record| {
+    let mut has_end = true;
+    let whole = recording.each_record(|record| {
         match &record {
             Record::Channel(channel) => _ = topics.insert(channel.id, channel.topic.clone()),
-            Record::Message { header, .. } if !times_ns.contains(&header.log_time) => return Ok(()),
+            // It follows the messages.
+            Record::Metadata(it) if it.name == RECOVERED && !has_end => return Ok(()),
+            Record::Message { header, .. } if !times_ns.contains(&header.log_time) => {
+                has_end = false;
+                return Ok(());
+            }
             Record::Message { header, data } => {
-                messages += 1;
+                (messages, has_end) = (messages + 1, true);
                 let topic = topics.get(&header.channel_id).map_or("", String::as_str);
                 if let Ok(Some(Item::Cycle(cycle))) = item(topic, data) {
                     let missing =
@@ -54,6 +60,10 @@ fn copy_to(recording: &Recording, to: &Path, times_ns: RangeInclusive<u64>) -> R
         }
         write(&mut writer, record).map_err(on(to))
     })?;
+    if let Some(cause) = whole.unfinished.filter(|_| has_end) {
+        let metadata = BTreeMap::from([("cause".into(), cause)]);
+        writer.write_metadata(&Metadata { name: RECOVERED.into(), metadata }).map_err(on(to))?;
+    }
     writer.finish().map_err(on(to))?;
     let file = writer.into_inner();
     file.sync_all().map_err(FileError::on(to))?;

@@ -24,6 +24,7 @@ pub mod reader;
 pub mod scene;
 pub mod schema;
 pub mod table;
+pub mod table_choice;
 
 /// Topic of [`CycleMessage`].
 pub const CYCLE: &str = "/hexad/cycle";
@@ -31,6 +32,8 @@ pub const CYCLE: &str = "/hexad/cycle";
 pub const MEMORY: &str = "/hexad/memory";
 /// Topic of [`GapMessage`].
 pub const GAP: &str = "/hexad/gap";
+/// Metadata of a file that `hexad recover` has completed: why it was not complete.
+const RECOVERED: &str = "recovered";
 /// Topic of the frames, as ROS tools expect it.
 pub const FRAMES: &str = "/tf";
 /// Topic of the legs, as ROS tools expect it.
@@ -61,6 +64,9 @@ pub enum RecordingError {
     /// Nothing of the file is left.
     #[error("{}: no complete cycle is in it: nothing can be recovered", .0.display())]
     Empty(PathBuf),
+    /// Columns were chosen that the table does not have.
+    #[error("--columns: {0}")]
+    Columns(String),
 }
 
 /// Part of a file that has changed since it was written.

@@ -10,7 +10,7 @@ use mcap::read::ChunkReader;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::{CYCLE, Damage, GAP, Item, MEMORY, RecordingError, RunInfo};
+use super::{CYCLE, Damage, GAP, Item, MEMORY, RECOVERED, RecordingError, RunInfo};
 use hexad_client::messages::cdr;
 use hexad_client::messages::layout::Declared as _;
 use hexad_client::messages::{CycleMessage, GapMessage};
@@ -39,6 +39,8 @@ pub struct Summary {
     pub cycles: u64,
     /// Why reading ended before the end of the file: a crash or a full disk has left it so.
     pub unfinished: Option<String>,
+    /// Whether it is unfinished, or was until `hexad recover` completed it: what followed its last cycle is unknown.
+    pub is_broken_off: bool,
     /// What has changed since it was written; it was left out.
     pub damage: Vec<Damage>,
 }
@@ -166,6 +168,7 @@ impl Recording {
                         "fault" => {
                             summary.fault = found.metadata.get("cycle").and_then(|cycle| cycle.parse().ok());
                         }
+                        RECOVERED => summary.is_broken_off = true,
                         _ => {}
                     }
                     names.insert(found.name);
@@ -193,6 +196,7 @@ impl Recording {
         if summary.cycles == 0 {
             return Err(RecordingError::Empty(self.path.clone()));
         }
+        summary.is_broken_off |= unfinished.is_some();
         Ok(Summary { unfinished, damage, ..summary })
     }
 

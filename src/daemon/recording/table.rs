@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::reader::{Recording, Summary};
+use super::table_choice::TableChoice;
 use super::{Item, RecordingError};
 use hexad_client::messages::layout::{Declared, Layout};
 use hexad_client::messages::{CycleMessage, ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
@@ -10,8 +11,11 @@ use hexad_core::control::controller::Output;
 use hexad_core::control::signals::inputs::{Input, SetpointKind};
 use hexad_core::control::signals::time::seconds_between;
 use hexad_core::model::task::{TaskState, task_coordinates};
+use hexad_machine::config::coordinates::Coordinates;
 use hexad_machine::text::csv_table::{in_group, pose_columns, trajectory_columns};
 use hexad_machine::text::csv_writer::CsvWriter;
+use hexad_machine::text::numbers::AXES;
+use hexad_machine::text::units::MotionUnits;
 
 /// Instants and origin of the numbers of a table.
 pub struct TableOrigin {
@@ -19,19 +23,22 @@ pub struct TableOrigin {
     pub home: [f64; 6],
     /// Release of a cycle to the instant of its reference \[ns\].
     pub reference_ns: u64,
+    /// Coordinates of the groups [`TOOL_POSES`], and their units if they are not in SI; without it there are no such groups.
+    pub tool: Option<(Coordinates, Option<MotionUnits>)>,
 }
 
-/// Writes the cycles of a recording as CSV, without the columns that have no number in any cycle. `t` counts from the fault whose
-/// window it is, else from the first cycle.
+/// Writes the chosen columns and cycles of a recording as CSV; without a choice all but columns that have no number in any cycle.
+/// `t` counts from the fault whose window it is, else from the first cycle. Returns the number of rows, too.
 pub fn write_csv(
     recording: &Recording,
     origin: &TableOrigin,
+    choice: &TableChoice,
     path: &Path,
-) -> Result<Summary, RecordingError> {
+) -> Result<(Summary, u64), RecordingError> {
     let Summary { fault, first, .. } = recording.summary()?;
     let mut zero_ns = first.release_ns;
     let columns = Columns::new();
-    let names = columns.names();
+    let names = columns.names(origin);
     let mut has_number = vec![false; names.len()];
     recording.each(|item| {
         let Item::Cycle(cycle) = item else { return };
@@ -44,17 +51,24 @@ pub fn write_csv(
     fn kept<T>(all: Vec<T>, is_kept: &[bool]) -> impl Iterator<Item = T> {
         all.into_iter().zip(is_kept).filter(|(_, is_kept)| **is_kept).map(|(kept, _)| kept)
     }
-    let header: Vec<_> = kept(names, &has_number).chain(NAMES.map(String::from)).collect();
-    let mut table = CsvWriter::new(&header);
+    let names = [names, NAMES.map(String::from).into()].concat();
+    has_number.extend(NAMES.map(|_| true));
+    let is_kept = choice.kept(&names, &has_number)?;
+    let mut table = CsvWriter::new(&kept(names, &is_kept).collect::<Vec<_>>());
+    let (are_numbers_kept, are_names_kept) = is_kept.split_at(is_kept.len() - NAMES.len());
+    let (mut rows, mut last) = (0, None);
     let summary = recording.each(|item| {
-        if let Item::Cycle(cycle) = item
+        let Item::Cycle(cycle) = item else { return };
+        let interval = Some(choice.every.interval(&first, &cycle));
+        if interval != last
             && let Some(row) = columns.row(&cycle, zero_ns, origin)
         {
-            table.row_with_names(kept(row, &has_number), names_of(&cycle));
+            table.row_with_names(kept(row, are_numbers_kept), kept(names_of(&cycle).into(), are_names_kept));
+            (rows, last) = (rows + 1, interval);
         }
     })?;
     table.save(path)?;
-    Ok(summary)
+    Ok((summary, rows))
 }
 
 /// Columns about the timing of a cycle; `t` \[s\].
@@ -68,6 +82,9 @@ const MOTIONS: [&str; 2] = ["setpoint", "reference"];
 
 /// Groups of X: to move to, found from the lengths, by another sensor.
 const POSES: [&str; 3] = ["target", "estimated", "measured"];
+
+/// Groups of X of a tool in a work frame: of the reference, and found from the lengths.
+pub const TOOL_POSES: [&str; 2] = ["tool_reference", "tool_estimated"];
 
 /// Fields of the measured message that are in no cycle or in a group.
 const NOT_MEASURED: [&str; 5] = ["header", "reserved", "pose_valid", "x", "twist"];
@@ -99,12 +116,18 @@ impl Columns {
         }
     }
 
-    fn names(&self) -> Vec<String> {
+    fn names(&self, origin: &TableOrigin) -> Vec<String> {
         let mut names: Vec<_> = TIMING.map(String::from).into();
         names.extend(MOTIONS.iter().flat_map(|group| in_group(group, &trajectory_columns())));
         names.extend(POSES.iter().flat_map(|group| in_group(group, &pose_columns())));
         for section in [&self.setpoint, &self.measured, &self.status, &self.force] {
             names.extend_from_slice(&section.names);
+        }
+        if let Some((_, units)) = &origin.tool {
+            let unit = |axis| units.map_or_else(String::new, |units| format!("_{}", units.of_axis(axis).0));
+            let coordinates = AXES.iter().enumerate().map(|(axis, name)| format!("{name}{}", unit(axis)));
+            let columns: Vec<_> = ["t".into()].into_iter().chain(coordinates).collect();
+            names.extend(TOOL_POSES.iter().flat_map(|group| in_group(group, &columns)));
         }
         names
     }
@@ -128,6 +151,16 @@ impl Columns {
         self.measured.append(&mut row, measured.as_deref());
         self.status.append(&mut row, Some(&status.numbers()));
         self.force.append(&mut row, Some(&ForceMessage::new(&output, input.release_ns).numbers()));
+        if let Some((coordinates, units)) = &origin.tool {
+            let end_ns = input.release_ns + origin.reference_ns;
+            let reference = reference(&output, &origin.home).map(|it| (end_ns, it.x.into()));
+            for pose in [reference, estimated(&input, &output, &origin.home)] {
+                row.push(pose.map_or(f64::NAN, |(instant_ns, _)| seconds_between(zero_ns, instant_ns)));
+                let x = pose.map_or([f64::NAN; 6], |(_, x)| coordinates.tool_x(&x));
+                let factor = |axis| units.map_or(1.0, |units| units.of_axis(axis).1);
+                row.extend(x.into_iter().enumerate().map(|(axis, x)| x / factor(axis)));
+            }
+        }
         Some(row)
     }
 }
@@ -136,6 +169,17 @@ impl Columns {
 fn names_of(cycle: &CycleMessage) -> [&'static str; 2] {
     let output = cycle.output().unwrap_or_default();
     [output.state.name(), cycle.input().and_then(|input| input.setpoint).map_or("", |it| it.kind.name())]
+}
+
+/// The reference at the end of the hold of the cycle's force.
+fn reference(output: &Output, home: &[f64; 6]) -> Option<TaskState> {
+    output.reference.and_then(|it| TaskState::of_motion(&it, home))
+}
+
+/// X from the measured lengths, and its instant \[ns\].
+fn estimated(input: &Input, output: &Output, home: &[f64; 6]) -> Option<(u64, [f64; 6])> {
+    let (measured, platform) = input.measurement.zip(output.platform)?;
+    Some((measured.time_ns, task_coordinates(&platform.pose, home)))
 }
 
 /// Adds the groups of a cycle, each with the instant of its motion or pose.
@@ -155,14 +199,12 @@ fn append_groups(row: &mut Vec<f64>, input: &Input, output: &Output, zero_ns: u6
     // The derivatives of a pose are zeros in the message.
     let sampled = of_kind(SetpointKind::Pose).map(|it| pose(t(it.time_ns), &it.task.x.into()));
     append(requested.or(sampled), trajectory_columns().len());
-    let reference = output.reference.and_then(|it| TaskState::of_motion(&it, home));
     let end = t(input.release_ns + origin.reference_ns);
-    append(reference.map(|it| motion(end, &it)), trajectory_columns().len());
+    append(reference(output, home).map(|it| motion(end, &it)), trajectory_columns().len());
     let target = of_kind(SetpointKind::Target).map(|it| pose(t(it.time_ns), &it.task.x.into()));
     append(target, pose_columns().len());
+    append(estimated(input, output, home).map(|(ns, x)| pose(t(ns), &x)), pose_columns().len());
     let measured = input.measurement.map(|it| (t(it.time_ns), it.pose));
-    let estimated = measured.zip(output.platform);
-    append(estimated.map(|((t, _), it)| pose(t, &task_coordinates(&it.pose, home))), pose_columns().len());
     // The lengths have the same instant.
     append(measured.map(|(t, x)| pose(t, &x.unwrap_or([f64::NAN; 6]))), pose_columns().len());
 }

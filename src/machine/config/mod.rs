@@ -34,7 +34,6 @@ pub mod frames;
 mod geometry;
 mod machine;
 pub mod machine_name;
-mod nearest;
 mod reader;
 mod syntax;
 pub mod text;

@@ -11,9 +11,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::bound::{Bound, integer, number};
-use super::nearest::nearest;
 use super::{MAX_VIOLATIONS, Violation};
 use crate::text::excerpt::excerpt;
+use crate::text::nearest::nearest;
 use hexad_core::model::LEGS;
 
 /// Log of the violations in a text, shared by the readers of all its sections.

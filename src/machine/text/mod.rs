@@ -8,6 +8,7 @@ pub mod csv_table;
 pub mod csv_writer;
 pub mod excerpt;
 pub mod files;
+pub mod nearest;
 pub mod numbers;
 pub mod text_table;
 pub mod units;

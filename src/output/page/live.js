@@ -62,6 +62,7 @@ async function poll() {
   // To the last whole sample.
   HEAD.length_s = Math.max(HEAD.period_s, levels[0].next * levels[0].step);
   tracks = fresh.tracks;
+  rows = fresh.rows;
   showFacts(fresh.facts);
   return fresh;
 }

@@ -64,13 +64,14 @@ impl PageKind {
     }
 }
 
-/// Assembles a page. `head` is JSON, `samples` are the bytes of numbers.
-pub fn page(kind: PageKind, title: &str, head: &str, samples: &[u8]) -> String {
+/// Assembles a page. `summary` is plain text, which its scripts replace, `head` is JSON, `samples` are the bytes of numbers.
+pub fn page(kind: PageKind, title: &str, summary: &str, head: &str, samples: &[u8]) -> String {
     let mut text = String::with_capacity(samples.len() / 3 * 4 + head.len() + 500_000);
     for part in FRAME.split("{{") {
         let (name, rest) = part.split_once("}}").unwrap_or(("", part));
         match name {
-            "title" => text.push_str(&title.replace('&', "&amp;").replace('<', "&lt;")),
+            "title" => text.push_str(&escaped(title)),
+            "summary" => text.push_str(&escaped(summary)),
             "policy" => text.push_str(kind.policy()),
             "license" => text.push_str(LICENSE),
             "body" => text.push_str(kind.body()),
@@ -84,6 +85,10 @@ pub fn page(kind: PageKind, title: &str, head: &str, samples: &[u8]) -> String {
         text.push_str(rest);
     }
     text
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -128,7 +133,8 @@ mod tests {
     fn a_page_is_one_document_that_no_text_can_leave() {
         let head = "{\"text\":\"</script><script>alert(1)\"}";
         for kind in [PageKind::Recording, PageKind::Live, PageKind::Identification] {
-            let text = page(kind, "a < b & c", head, b"foo");
+            let text = page(kind, "a < b & c", "1 < 2 & 3", head, b"foo");
+            assert!(text.contains("<pre id=\"summary\">1 &lt; 2 &amp; 3</pre>"));
             assert!(text.contains("<title>a &lt; b &amp; c</title>") && text.contains(">Zm9v</script>"));
             assert!(!text.contains("alert(1)</script>") && !text.contains("</script><script>alert"));
             assert_eq!(text.contains("connect-src 'self'"), kind == PageKind::Live);

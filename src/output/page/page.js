@@ -8,6 +8,8 @@ let now = 0;
 let isFollowed = HEAD.is_live;
 
 function showFacts(facts) {
+  // The same as plain text, for what runs no script.
+  byId("summary")?.remove();
   byId("facts").replaceChildren(...facts.flatMap(({ name, text, is_bad }) => [
     element("dt", { textContent: name }), element("dd", { textContent: text, className: is_bad ? "bad" : "" }),
   ]));

@@ -52,7 +52,8 @@ function watchControls() {
 
 function begin() {
   const recorded = new Date(1000 * HEAD.begin_s).toISOString().slice(0, 19).replace("T", " ");
-  byId("title").replaceChildren(HEAD.name, element("small", { textContent: HEAD.is_live ? "live" : `${recorded} UTC` }));
+  const ending = HEAD.is_unfinished ? ", unfinished" : "";
+  byId("title").replaceChildren(HEAD.name, element("small", { textContent: HEAD.is_live ? "live" : `${recorded} UTC${ending}` }));
   byId("configuration").textContent = HEAD.configuration;
   byId("kept").textContent = HEAD.kept === "" ? "" : `Of the samples, ${HEAD.kept}.`;
   showFacts(HEAD.facts);

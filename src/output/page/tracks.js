@@ -8,10 +8,9 @@ const SCALE_PX = 20;
 const LEGEND_PX = 224;
 // An interval is at least so wide, so that a single cycle is seen.
 const LEAST_PX = 2;
-// Most rows of the list; more cannot be read.
-const LIST_ROWS = 300;
 
 let tracks = HEAD.tracks;
+let rows = HEAD.rows;
 
 function intervalColor(track, interval) {
   if (track.group === "state") return color(HEAD.states[interval.key]);
@@ -118,20 +117,15 @@ function firstFault() {
 function fillList() {
   const table = document.getElementById("intervals");
   table.replaceChildren(element("tr", {}, ...["from [s]", "to [s]", "", "", ""].map((text) => element("th", { textContent: text }))));
-  const all = tracks.flatMap((track) => track.intervals.map((interval) => ({ track, interval })));
-  all.sort((a, b) => a.interval.from - b.interval.from);
-  for (const { track, interval } of all.slice(0, LIST_ROWS)) {
-    const button = element("button", { type: "button", textContent: interval.from.toFixed(3), title: "Show it" });
+  for (const { from, to, name, text } of rows) {
+    const button = element("button", { type: "button", textContent: from.toFixed(3), title: "Show it" });
     button.addEventListener("click", () => {
-      const border = Math.max(interval.to - interval.from, 100 * HEAD.period_s);
-      setRange(interval.from - border, interval.to + border);
-      setTime(interval.from);
+      const border = Math.max(to - from, 100 * HEAD.period_s);
+      setRange(from - border, to + border);
+      setTime(from);
     });
-    const cells = [element("td", {}, button), interval.to.toFixed(3), clock(interval.from), track.name, interval.text];
+    const cells = [element("td", {}, button), to.toFixed(3), clock(from), name, text];
     table.append(element("tr", {}, cells[0], ...cells.slice(1).map((text) => element("td", { textContent: text }))));
-  }
-  if (all.length > LIST_ROWS) {
-    table.append(element("tr", {}, element("td", { colSpan: 4, textContent: `and ${all.length - LIST_ROWS} more` })));
   }
 }
 

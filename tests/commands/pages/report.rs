@@ -14,8 +14,9 @@ use hexad::messages::CycleMessage;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::rigid::Twist;
 use hexad::model::task::TaskState;
-use hexad::recording::RunInfo;
 use hexad::recording::file::RecordingFile;
+use hexad::recording::reader::Recording;
+use hexad::recording::{Item, RunInfo};
 use serde_json::{Value, json};
 
 use super::super::{Folder, has};
@@ -200,6 +201,56 @@ fn files_without_a_cycle_are_left_out_and_one_with_damaged_cycles_is_not() {
     damaged[at] ^= 1;
     folder.write("4.mcap", damaged);
     folder.refuses(&format!("{line} @/4.mcap"), &["/4.mcap: "]);
+}
+
+/// A page of a file that broke off never claims that it is whole, not even once the file is completed; and it says so without scripts.
+#[test]
+fn a_file_that_broke_off_is_unfinished_until_another_goes_on() {
+    let folder = machine();
+    let config = folder.config();
+    write(&folder, "whole.mcap", &config, 1, FAULT - 50..FAULT + 450);
+    let whole = fs::read(folder.path("whole.mcap")).unwrap();
+    folder.write("cut.mcap", &whole[..whole.len() * 7 / 10]);
+    folder.execute("recover @/cut.mcap --output @/recovered.mcap").unwrap();
+    let mut last = 0;
+    let cut = Recording::open(&folder.path("cut.mcap")).unwrap();
+    cut.each(|item| {
+        if let Item::Cycle(cycle) = item {
+            last = cycle.cycle
+        }
+    })
+    .unwrap();
+    assert!((FAULT + 200..FAULT + 440).contains(&last), "{last}");
+    write(&folder, "next.mcap", &config, 1, last + 1..FAULT + 450);
+    let sentence =
+        "one: at 2.500 s (00:20:01 UTC) measurement lost: age 0.25 s exceeds timeouts.measured_ms 0.2 s";
+    let [cut_s, end_s] = [last, FAULT + 449].map(|number| seconds(number) - seconds(FAULT - 50));
+    let complete = format!("\nEnd: at {end_s:.3} s (00:20:23 UTC) in state active; the file is complete\n");
+    let unfinished = format!("\nEnd: unfinished, the last cycle is at {cut_s:.3} s (");
+    for (files, is_unfinished) in [
+        ("@/whole.mcap", false),
+        ("@/cut.mcap", true),
+        ("@/recovered.mcap", true),
+        ("@/next.mcap @/cut.mcap", false),
+    ] {
+        folder.execute(&format!("report -o @/report.html {files}")).unwrap();
+        let page = folder.read("report.html");
+        let (_, summary) = page.split_once("<pre id=\"summary\">").unwrap();
+        let summary = summary.split("</pre>").next().unwrap();
+        has(
+            summary,
+            &["an-hour: recording", ", from 1970-01-01 00:19:58 UTC\nRun: ", sentence, "\nStates: active "],
+        );
+        for (words, is_there) in
+            [(&*unfinished, is_unfinished), (") in state active; what followed is unknown", is_unfinished)]
+                .into_iter()
+                .chain([(&*complete, !is_unfinished), ("every cycle is in the recording", !is_unfinished)])
+        {
+            assert_eq!(summary.contains(words), is_there, "{files}: {words:?} in {summary}");
+        }
+        assert_eq!(page.contains("<title>an-hour: recording, unfinished</title>"), is_unfinished, "{files}");
+        assert!(page.contains(&format!("\"is_unfinished\":{is_unfinished},")), "{files}");
+    }
 }
 
 /// Files on both sides of two reloads, in any order, are one page that shows both.

@@ -287,6 +287,9 @@ impl DatagramFormat {
                 }
             };
             let in_unit = (number - field.zero) * field.scale;
+            if !in_unit.is_finite() {
+                return Err(Rejection::NotFinite(name, in_unit));
+            }
             let [low, high] = field.range.unwrap_or([f64::MIN, f64::MAX]);
             if !(low..=high).contains(&in_unit) {
                 return Err(Rejection::Range { name, value: in_unit, low, high, unit: field.unit.clone() });

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector6;
 
 use super::receiver::{Arrived, Receiver, SILENCE_CAUSES};
+use super::stream::{StreamError, StreamOptions, blended, seconds};
 use super::survey::StreamSurvey;
-use super::{StreamError, StreamOptions, blended, seconds};
 use crate::commands::progress::time_bar;
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use hexad_client::realtime::stop_request::Stop;
@@ -22,9 +22,13 @@ use hexad_core::model::rigid::{Acceleration, Motion, Twist};
 use hexad_core::model::task::{pose_of, task_coordinates};
 use hexad_daemon::constants;
 use hexad_machine::config::Config;
-use hexad_machine::text::coordinate_rows::{heading, row};
+use hexad_machine::text::coordinate_rows::CoordinateFormat;
 use hexad_machine::text::files::print;
-use hexad_machine::text::numbers::{AXES, MotionDigits, axis_unit, percent, significant};
+use hexad_machine::text::numbers::{AXES, axis_unit, percent, significant};
+use hexad_machine::text::units::MotionUnits;
+
+/// Ranges of coordinates below which nobody feels a motion \[rad\], \[m\].
+const STANDING: [f64; 6] = [2e-3, 2e-3, 2e-3, 1e-3, 1e-3, 1e-3];
 
 /// Time between two looks at the socket.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
@@ -41,19 +45,24 @@ pub fn run(
     let mut receiver = Receiver::open(config, address, options)?;
     let arrived = receive(&mut receiver, duration_s, stop);
     let (Some(first), Some(last)) = (arrived.first(), arrived.last()) else {
-        return Err(StreamError::Silence(format!("{}: {SILENCE_CAUSES}", receiver.description())));
+        let causes = if receiver.is_silent() { format!(": {SILENCE_CAUSES}") } else { String::new() };
+        return Err(StreamError::Silence(receiver.description() + &causes));
     };
     let constants = constants(config);
-    let mut survey = StreamSurvey::default();
+    let mut survey = StreamSurvey::over(duration_s);
     arrived.iter().for_each(|it| survey.add(&constants, it.arrival_ns, &it.x));
-    let digits = MotionDigits::new(config.resolution());
     let home = Vector6::from(config.machine.home);
     let [low, high] = survey.range.unwrap_or_default().map(|x| (Vector6::from(x) - home).into());
     let span_s = seconds(first.arrival_ns, last.arrival_ns);
     let mut text = format!("{} in {span_s:.1} s, {}\n", receiver.description(), timing(&arrived));
-    text += &(heading("about home") + &row("lowest", &low, digits) + &row("highest", &high, digits));
+    let format = CoordinateFormat::new(MotionUnits::default(), config.resolution());
+    text += &format.table("about home", &[("lowest", Some(low), 0), ("highest", Some(high), 0)]);
     let followed = Followed::new(config, &arrived);
     let _ = writeln!(text, "{}", followed.summary());
+    if Vector6::from(high) - Vector6::from(low) < Vector6::from(STANDING) {
+        text +=
+            "it hardly moves: is it in its menu, or are its numbers in larger units than its format says?\n";
+    }
     if let Some(path) = &options.output {
         followed.draw(path, config)?;
         let _ = writeln!(text, "{}", path.display());
@@ -63,13 +72,13 @@ pub fn run(
 }
 
 fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived> {
-    let (mut began, mut arrived) = (Instant::now(), vec![]);
+    let (mut began, mut arrived, mut was_silent) = (Instant::now(), vec![], true);
     let bar = time_bar(duration_s);
     while !stop.is_requested() && began.elapsed().as_secs_f64() < duration_s {
         bar.set_position(began.elapsed().as_millis() as u64);
         sleep(POLL_INTERVAL);
         while let Some(sample) = receiver.read() {
-            if arrived.is_empty() {
+            if core::mem::take(&mut was_silent) {
                 began = Instant::now();
             }
             arrived.extend(sample);

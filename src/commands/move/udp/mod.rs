@@ -10,22 +10,16 @@
 //!
 //! Datagrams are not authenticated: any program at an allowed address moves the platform, within the limits of the file.
 
-use std::io;
-use std::net::{IpAddr, SocketAddr};
-use std::path::PathBuf;
+use std::net::SocketAddr;
 use std::time::Duration;
 
-use clap::Args;
-use tracing::info;
+use tracing::{info, warn};
 
-use self::datagram_format::FormatError;
-use self::receiver::Receiver;
+use self::receiver::{Arrived, Receiver};
 use self::status_feed::StatusFeed;
+use self::stream::{BLEND_S, StreamError, StreamOptions, seconds};
 use self::survey::StreamSurvey;
 use super::PlaybackOptions;
-use crate::commands::failure::{CommandError, INTERRUPTED, default_exit_code};
-use crate::commands::quantity::{angle, length, list};
-use crate::output::svg::ChartError;
 use hexad_client::messages::Bus;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::operator::requests::status;
@@ -35,12 +29,10 @@ use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::constants::Constants;
 use hexad_core::control::parameters::ViolationPolicy;
 use hexad_core::model::task::pose_of;
-use hexad_core::motion::minimum_jerk::{rise, straight_move};
 use hexad_daemon::constants;
 use hexad_daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
 use hexad_machine::analysis::target_motion::{TargetRefusal, check_target};
 use hexad_machine::config::Config;
-use hexad_machine::text::files::FileError;
 use hexad_machine::text::numbers::fixed;
 
 mod datagram_format;
@@ -48,88 +40,26 @@ pub mod dry_run;
 mod receiver;
 mod rejection;
 mod status_feed;
+pub mod stream;
 mod survey;
 
-/// Duration of the blend from the pose at which the platform stands to the stream \[s\].
-const BLEND_S: f64 = 3.0;
+/// Why a ride ends when the program that sends begins anew.
+const RESTARTED: &str = "the program that sends has started again";
 
 /// Share of the way from home to the lowest pose at which people board.
 const COMFORTABLE_SHARE: f64 = 0.9;
 
+/// Messages with the last target: one may be lost.
+const LAST_TARGETS: usize = 3;
+
 /// Way below which nobody boards \[mm\].
 const LOWEST_MM: u32 = 3000;
 
+/// Time whose poses decide whether a stream is doubtful \[s\].
+const SURVEY_S: f64 = 5.0;
+
 /// Pause after which the platform moves to the boarding pose \[s\].
 const LONG_PAUSE_S: f64 = 10.0;
-
-#[derive(Debug, Default, Args)]
-pub struct StreamOptions {
-    /// Format of the datagrams: x-plane, flypt-mover, simtools, or a file, see docs/motion_simulator.md
-    #[arg(long, value_name = "NAME", requires = "udp")]
-    format: Option<String>,
-    /// Address from which datagrams are accepted; required unless --udp is of this host alone
-    #[arg(long, value_name = "IP", requires = "udp")]
-    from: Vec<IpAddr>,
-    /// Pose at which people board, with units, as in 0,0,0,0,0,0.7m; without it, home, lowered to nine tenths of what the machine permits
-    #[arg(long, value_name = "X", requires = "udp", value_parser = boarding, allow_hyphen_values = true)]
-    boarding: Option<[f64; 6]>,
-    /// Receive and examine the stream for --seconds; move nothing, and need no daemon
-    #[arg(long, requires = "udp", conflicts_with_all = ["engage", "boarding"])]
-    pub dry_run: bool,
-    /// SVG file for the picture of the stream
-    #[arg(long, value_name = "FILE", requires = "dry_run")]
-    output: Option<PathBuf>,
-}
-
-fn boarding(text: &str) -> Result<[f64; 6], String> {
-    list(text, [angle, angle, angle, length, length, length], "0,0,0,0,0,0.7m")
-}
-
-/// Reasons why no stream is followed.
-#[derive(Debug, thiserror::Error)]
-pub enum StreamError {
-    #[error("--udp: needs --format: x-plane, flypt-mover, simtools, or a file")]
-    NoFormat,
-    #[error(transparent)]
-    Format(#[from] FormatError),
-    #[error("--udp {0}: must be the address of one interface")]
-    AnyInterface(SocketAddr),
-    #[error("--udp {0}: is open to other hosts: name those that may move the platform with --from")]
-    NoSender(SocketAddr),
-    #[error("--udp {0}: {1}")]
-    Socket(SocketAddr, io::Error),
-    #[error("--udp: poses alone need setpoint.on_violation = \"limit\" in the machine file (now \"stop\")")]
-    Policy,
-    #[error("signals of pause and resume: {0}")]
-    Signals(io::Error),
-    #[error("{0}")]
-    Silence(String),
-    #[error(transparent)]
-    Picture(#[from] ChartError),
-    #[error(transparent)]
-    Output(#[from] FileError),
-    #[error(transparent)]
-    Target(#[from] TargetError),
-    #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
-    Interrupted,
-}
-
-impl CommandError for StreamError {
-    fn has_begun(&self) -> bool {
-        match self {
-            Self::Target(error) => error.has_begun(),
-            Self::Silence(_) | Self::Picture(_) | Self::Output(_) => true,
-            _ => false,
-        }
-    }
-
-    fn exit_code(&self) -> u8 {
-        match self {
-            Self::Interrupted => INTERRUPTED,
-            _ => default_exit_code(self),
-        }
-    }
-}
 
 /// Follows the datagrams to an address, each time that the operator begins a ride, until the first signal; then the platform moves to
 /// the boarding pose and stands there.
@@ -152,11 +82,17 @@ pub fn follow(
     let source = open_source(config, &bus, playback.engage_within(), stop)?;
     let [_, _, _, x, y, z] = boarding.map(|coordinate| fixed(1e3 * coordinate, 0));
     info!(%address, "moves to the boarding pose (x, y, z = {x}, {y}, {z} mm)");
-    let survey = StreamSurvey::default();
+    let survey = StreamSurvey::over(SURVEY_S);
     let mut ride = Ride { source, receiver, survey, boarding, constants: &constants, phase: Phase::Boarding };
     while !stop.is_repeated() && ride.step(pause.is_requested(), stop.is_requested())? {}
     info!("{}", ride.receiver.description());
-    if stop.is_repeated() { Err(StreamError::Interrupted) } else { Ok(()) }
+    if !stop.is_repeated() {
+        return Ok(());
+    }
+    // The daemon goes on to the last target.
+    let rest = ride.source.resting_x(&constants)?;
+    (0..LAST_TARGETS).try_for_each(|_| ride.source.publish(rest))?;
+    Err(StreamError::Interrupted)
 }
 
 /// Home, lowered along gravity by nine tenths of the way that the workspace permits.
@@ -185,62 +121,86 @@ impl Ride<'_> {
     /// Publishes the setpoint of one period. False at the end.
     fn step(&mut self, is_paused: bool, is_ending: bool) -> Result<bool, StreamError> {
         let (newest, now_ns) = (self.receiver.newest(), monotonic_ns());
+        newest.iter().for_each(|it| self.survey(it));
         let order = self.describe(is_paused);
         if is_ending && !matches!(self.phase, Phase::Leaving) {
             info!("moves to the boarding pose; once more ends at once");
             self.phase = Phase::Leaving;
         }
-        if order == Some(RideOrder::End) {
-            self.board("the operator ends the ride");
-        }
         match self.phase {
-            Phase::Boarding | Phase::Leaving => {
+            Phase::Leaving => {
                 self.source.publish(self.boarding)?;
-                let is_there = self.source.active_since_ns().is_some()
-                    && is_reached(&self.source.present_x()?, &self.boarding);
-                match self.phase {
-                    Phase::Leaving if is_there => return Ok(false),
-                    Phase::Boarding if is_there => {
-                        info!("stands at the boarding pose; hexad ride start begins the ride");
-                        self.phase = Phase::Ready;
-                    }
-                    _ => {}
+                return Ok(!self.has_boarded()?);
+            }
+            Phase::Boarding => {
+                self.source.publish(self.boarding)?;
+                if self.has_boarded()? {
+                    info!("stands at the boarding pose; hexad ride start begins the ride");
+                    self.phase = Phase::Ready;
+                } else if is_paused {
+                    self.pause(false, now_ns)?;
                 }
             }
             Phase::Ready => {
                 self.source.publish(self.boarding)?;
-                newest.iter().for_each(|it| self.survey.add(self.constants, it.arrival_ns, &it.x));
+                if self.receiver.take_restart() {
+                    self.survey = StreamSurvey::over(SURVEY_S);
+                }
                 let may_begin = self.receiver.is_alive(now_ns) && self.survey.is_long_enough();
                 if order == Some(RideOrder::Start) && may_begin {
-                    self.receiver.take_restart();
                     self.phase = Phase::following(self.boarding);
                 }
             }
             Phase::Following { from, since_ns } => {
-                // The last target is newer than datagrams that were late.
-                let new = newest.filter(|it| it.time_ns > since_ns);
-                self.source
-                    .publish_sample(new.map(|it| (it.time_ns, blended(&from, &it.x, since_ns, now_ns))))?;
-                if is_paused || self.receiver.silence_s(now_ns) > self.receiver.pause_s {
-                    let x = self.source.resting_x(self.constants)?;
-                    info!("a pause: the platform stands");
-                    self.phase = Phase::Pause { x, since_ns: now_ns };
+                self.source.publish_sample(newest.and_then(|it| it.blended(&from, since_ns, now_ns)))?;
+                if order == Some(RideOrder::End) {
+                    self.board("the operator ends the ride");
+                } else if is_paused || self.receiver.silence_s(now_ns) > self.receiver.pause_s {
+                    self.pause(true, now_ns)?;
+                } else if self.receiver.take_restart() {
+                    self.board(RESTARTED);
                 }
-                self.board_if_restarted();
             }
-            Phase::Pause { x, since_ns } => {
+            Phase::Pause { x, since_ns, rides } => {
                 self.source.publish(x)?;
-                if is_paused {
-                    self.phase = Phase::Pause { x, since_ns: now_ns };
+                if order == Some(RideOrder::End) {
+                    self.board("the operator ends the ride");
+                } else if is_paused {
+                    self.phase = Phase::Pause { x, since_ns: now_ns, rides };
+                } else if !rides {
+                    self.board("the pause has ended");
+                } else if self.receiver.take_restart() {
+                    self.board(RESTARTED);
                 } else if self.receiver.is_alive(now_ns) {
                     self.phase = Phase::following(x);
                 } else if seconds(since_ns, now_ns) > LONG_PAUSE_S {
                     self.board("a long pause");
                 }
-                self.board_if_restarted();
             }
         }
         Ok(true)
+    }
+
+    /// Examines a pose of the stream.
+    fn survey(&mut self, Arrived { arrival_ns, x, .. }: &Arrived) {
+        let was_doubtful = self.survey.doubt().is_some();
+        self.survey.add(self.constants, *arrival_ns, x);
+        if let Some(doubt) = self.survey.doubt().filter(|_| !was_doubtful) {
+            warn!("{doubt}");
+        }
+    }
+
+    /// Whether the platform is under control at the boarding pose.
+    fn has_boarded(&mut self) -> Result<bool, TargetError> {
+        Ok(self.source.active_since_ns().is_some() && is_reached(&self.source.present_x()?, &self.boarding))
+    }
+
+    /// Comes to rest, on the way to the boarding pose or in a ride.
+    fn pause(&mut self, rides: bool, now_ns: u64) -> Result<(), TargetError> {
+        info!("a pause: the platform comes to rest");
+        let x = self.source.resting_x(self.constants)?;
+        self.phase = Phase::Pause { x, since_ns: now_ns, rides };
+        Ok(())
     }
 
     /// Describes phase and stream to the operator. Returns what the operator, who has seen this phase, wants.
@@ -253,16 +213,10 @@ impl Ride<'_> {
         })
     }
 
-    fn board_if_restarted(&mut self) {
-        if self.receiver.take_restart() {
-            self.board("the program that sends has started again");
-        }
-    }
-
     /// Moves to the boarding pose: from there only the operator begins a ride.
     fn board(&mut self, reason: &str) {
         info!("{reason}: moves to the boarding pose");
-        (self.phase, self.survey) = (Phase::Boarding, StreamSurvey::default());
+        self.phase = Phase::Boarding;
     }
 }
 
@@ -292,8 +246,8 @@ enum Phase {
     Ready,
     /// Follows the stream, at first blended with the pose at which it stood.
     Following { from: [f64; 6], since_ns: u64 },
-    /// Stands where it came to rest.
-    Pause { x: [f64; 6], since_ns: u64 },
+    /// Stands where it came to rest, in a ride or on the way to the boarding pose.
+    Pause { x: [f64; 6], since_ns: u64, rides: bool },
     /// Goes to the boarding pose for good.
     Leaving,
 }
@@ -315,13 +269,4 @@ impl Phase {
         info!("follows the stream, after a blend of {BLEND_S:.0} s");
         Self::Following { from, since_ns: monotonic_ns() }
     }
-}
-
-/// A pose of the stream, blended from the pose at which the platform stood.
-fn blended(from: &[f64; 6], to: &[f64; 6], since_ns: u64, now_ns: u64) -> [f64; 6] {
-    straight_move(&(*from).into(), &(*to).into(), &rise(seconds(since_ns, now_ns), BLEND_S)).x.into()
-}
-
-fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }

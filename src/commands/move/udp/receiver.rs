@@ -6,7 +6,7 @@ use tracing::warn;
 
 use super::datagram_format::{Datagram, DatagramFormat, MAX_BYTES};
 use super::rejection::{Rejection, RejectionCounts};
-use super::{StreamError, StreamOptions, seconds};
+use super::stream::{StreamError, StreamOptions, blended, seconds};
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::source_clock::SourceClock;
 use hexad_core::model::task::pose_of;
@@ -38,6 +38,13 @@ pub struct Arrived {
     pub x: [f64; 6],
 }
 
+impl Arrived {
+    /// Instant and X, blended from the pose at which the platform stood; `None` of a pose that was late, as the last target is newer.
+    pub fn blended(&self, from: &[f64; 6], since_ns: u64, now_ns: u64) -> Option<(u64, [f64; 6])> {
+        (self.time_ns > since_ns).then(|| (self.time_ns, blended(from, &self.x, since_ns, now_ns)))
+    }
+}
+
 /// Why nothing arrives, the most likely first.
 pub const SILENCE_CAUSES: &str = "the program does not send, or to another address or port; it sends broadcasts, which arrive only if --udp is the broadcast \
      address; a firewall is between";
@@ -53,7 +60,8 @@ pub struct Receiver {
     pub pause_s: f64,
     /// Arrival of the last datagram \[ns\].
     last_ns: u64,
-    sender: Option<SocketAddr>,
+    /// The program whose datagrams count, by its address, and their number.
+    sender: Option<(SocketAddr, u64)>,
     /// Whether the program that sends has begun anew.
     has_restarted: bool,
     /// Datagrams since the last pause.
@@ -120,17 +128,20 @@ impl Receiver {
         Some(sample.ok())
     }
 
+    /// Whether no datagram has arrived.
+    pub fn is_silent(&self) -> bool {
+        self.accepted == 0 && self.rejected == RejectionCounts::default()
+    }
+
     /// What arrived, for the operator.
     pub fn description(&self) -> String {
-        match (self.accepted, &self.rejected) {
-            (0, none) if *none == RejectionCounts::default() => "no datagram has arrived".into(),
-            (accepted, rejected) => {
-                let rate = self.clock.rate().filter(|rate| *rate != 1.0);
-                let clock = rate
-                    .map_or_else(String::new, |rate| format!("; their clock runs at {rate:.3} of real time"));
-                format!("{accepted} datagrams accepted{clock}{rejected}")
-            }
+        if self.is_silent() {
+            return "no datagram has arrived".into();
         }
+        let rate = self.clock.rate().filter(|rate| *rate != 1.0);
+        let clock =
+            rate.map_or_else(String::new, |rate| format!("; their clock runs at {rate:.3} of real time"));
+        format!("{} datagrams accepted{clock}{}", self.accepted, self.rejected)
     }
 
     fn sample(&mut self, bytes: &[u8], sender: SocketAddr, arrival_ns: u64) -> Result<Arrived, Rejection> {
@@ -139,15 +150,20 @@ impl Receiver {
         }
         let datagram = self.format.read(bytes, &pose_of(&self.home), &self.home);
         let Datagram { stamp_s, x } = datagram?;
+        // A program that is started again has another port. Some have another for each datagram.
+        let (before, count) = self.sender.unwrap_or((sender, 0));
+        let is_restart = before != sender && count > 1;
+        if is_restart && self.silence_s(arrival_ns) <= self.pause_s {
+            return Err(Rejection::Second(sender, before));
+        }
+        self.sender = Some((sender, if before == sender { count.saturating_add(1) } else { 1 }));
         let lives = self.clock.lives();
         let time_ns = match stamp_s {
             Some(stamp_s) => self.clock.instant((stamp_s * 1e9) as i64, arrival_ns as i64)?.time_ns,
             None => arrival_ns as i64,
         };
         let is_pause = self.silence_s(arrival_ns) > self.pause_s;
-        // A program that is started again has another port. Some have another for each datagram: only after a pause it says so.
-        let is_other = is_pause && self.sender.replace(sender).is_some_and(|before| before != sender);
-        self.has_restarted |= is_other || self.clock.lives() != lives;
+        self.has_restarted |= is_restart || self.clock.lives() != lives;
         self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
         (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);
         Ok(Arrived { arrival_ns, time_ns: time_ns as u64, x })

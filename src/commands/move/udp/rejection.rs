@@ -2,6 +2,7 @@
 
 use core::fmt;
 use core::mem::discriminant;
+use core::net::SocketAddr;
 
 use hexad_client::messages::source_clock::NoInstant;
 use hexad_machine::text::excerpt::{excerpt, stranger};
@@ -13,6 +14,9 @@ pub enum Rejection {
     /// From an address that is not permitted.
     #[error("its sender is not among --from")]
     Sender,
+    /// Of a second program beside the first.
+    #[error("{0} sends while {1} does: end one of the two programs")]
+    Second(SocketAddr, SocketAddr),
     /// Another kind of datagram.
     #[error("it has not the bytes that the format's mark states: another kind of datagram")]
     Mark,
@@ -44,6 +48,9 @@ pub enum Rejection {
     /// No number.
     #[error("{0:?} is no number{1}")]
     NoNumber(String, String),
+    /// NaN or infinite.
+    #[error("{0} is {1}, which is no number")]
+    NotFinite(&'static str, f64),
     /// Beyond the range of the format.
     #[error("{name} = {} {unit} is not in its range [{}, {}]", significant(*value), significant(*low), significant(*high))]
     Range { name: &'static str, value: f64, low: f64, high: f64, unit: String },

@@ -8,7 +8,7 @@ use hexad_core::model::task::pose_of;
 use hexad_machine::analysis::target_motion::{ExceededBound, check_target};
 use hexad_machine::text::numbers::{AXES, axis_unit, percent, significant};
 
-use super::seconds;
+use super::stream::seconds;
 
 /// Shortest stream of which units are judged \[s\].
 const LEAST_S: f64 = 2.0;
@@ -19,15 +19,17 @@ const MAX_STEP_S: f64 = 0.25;
 /// Largest share of poses outside of the workspace that is a matter of scale, not of units.
 const MAX_OUTSIDE: f64 = 0.05;
 
-/// Poses of a stream.
+/// Poses of a stream, the newest with the most weight.
 #[derive(Clone, Debug, Default)]
 pub struct StreamSurvey {
-    poses: u32,
+    /// Time after which a pose has lost most of its weight \[s\].
+    memory_s: f64,
+    poses: f64,
     last: Option<(u64, [f64; 6])>,
     /// Lowest and highest coordinates.
     pub range: Option<[[f64; 6]; 2]>,
     /// Poses outside of the workspace, and the bound that one exceeds.
-    outside: u32,
+    outside: f64,
     bound: Option<ExceededBound>,
     /// Way \[m\] and angle \[rad\] in the time of the steps \[s\].
     way: f64,
@@ -38,6 +40,11 @@ pub struct StreamSurvey {
 }
 
 impl StreamSurvey {
+    /// Survey of the last seconds.
+    pub fn over(memory_s: f64) -> Self {
+        Self { memory_s, ..Self::default() }
+    }
+
     /// Adds a pose that arrived at an instant \[ns\].
     pub fn add(&mut self, constants: &Constants, arrival_ns: u64, x: &[f64; 6]) {
         let limits = &constants.parameters.limits;
@@ -45,11 +52,19 @@ impl StreamSurvey {
         let [low, high] = self.range.unwrap_or([*x; 2]);
         let [low, high, new] = [low, high, *x].map(Vector6::from);
         self.range = Some([low.inf(&new).into(), high.sup(&new).into()]);
-        self.poses = self.poses.saturating_add(1);
-        if let Err(bound) = check_target(constants, &pose_of(x)) {
-            (self.outside, self.bound) = (self.outside.saturating_add(1), Some(bound));
+        let before = self.last.replace((arrival_ns, *x));
+        if let Some((before_ns, _)) = before {
+            let kept = (-seconds(before_ns, arrival_ns) / self.memory_s).exp();
+            for sum in [&mut self.poses, &mut self.outside, &mut self.way, &mut self.angle, &mut self.time_s]
+            {
+                *sum *= kept;
+            }
         }
-        if let Some((before_ns, before)) = self.last.replace((arrival_ns, *x)) {
+        self.poses += 1.0;
+        if let Err(bound) = check_target(constants, &pose_of(x)) {
+            (self.outside, self.bound) = (self.outside + 1.0, Some(bound));
+        }
+        if let Some((before_ns, before)) = before {
             let step_s = seconds(before_ns, arrival_ns);
             if step_s < MAX_STEP_S {
                 let Twist { angular, linear } = pose_of(&before).displacement_to(&pose_of(x));
@@ -66,24 +81,27 @@ impl StreamSurvey {
 
     /// Why the units of the stream are hardly those of its format.
     pub fn doubt(&self) -> Option<String> {
-        let share = f64::from(self.outside) / f64::from(self.poses.max(1));
+        let share = self.outside / self.poses.max(1.0);
         let [way, angle] = [self.way, self.angle].map(|moved| moved / self.time_s.max(LEAST_S));
         let outside = self.bound.filter(|_| share > MAX_OUTSIDE).map(|bound| {
-            format!("{} of its poses are outside of the workspace, as by {bound}", percent(share))
+            format!("{} of its last poses are outside of the workspace, as by {bound}", percent(share))
         });
         let fast = |value: f64, limit: f64, unit: &str| {
             let [value, limit] = [value, limit].map(significant);
-            format!("on average it moves at {value} {unit}, limit {limit} {unit}")
+            format!("of late it moves at {value} {unit}, limit {limit} {unit}")
         };
         let [slow, calm] = self.limits;
         let reason = outside
             .or_else(|| (way > slow).then(|| fast(1e3 * way, 1e3 * slow, "mm/s")))
             .or_else(|| (angle > calm).then(|| fast(angle.to_degrees(), calm.to_degrees(), "deg/s")))?;
-        Some(format!("do its units, or its scale, differ from its format? {reason}; {}", self.widest()))
+        Some(format!(
+            "do its units, or its scale, differ from its format? {reason}; until now {}",
+            self.ranges()
+        ))
     }
 
     /// The ranges of position and orientation, for people.
-    fn widest(&self) -> String {
+    fn ranges(&self) -> String {
         let [low, high] = self.range.unwrap_or_default();
         let ranges = AXES.iter().enumerate().zip(low.iter().zip(high)).filter(|(_, (low, high))| high > *low);
         let ranges = ranges.map(|((k, axis), (low, high))| {

@@ -37,7 +37,7 @@ fn the_formats_with_a_name_read_what_their_first_lines_say() {
         ("1,2,3,4,5", "has 5 fields, must have 6"),
         ("12,5,-3,4,1,-2,3", "a decimal comma where commas separate?"),
         ("1;2;3;4;5;6", "has 1 fields"),
-        ("1,2,3,4,5,nan", "gamma = NaN deg is not in its range [-180, 180]"),
+        ("1,2,3,4,5,nan", "gamma is NaN, which is no number"),
         ("1,2,3,4,5,-999", "gamma = -999 deg is not in its range"),
         ("1,2,3,4,5,\u{2212}6", "is no number; it contains U+2212, which may look like '-'"),
         ("1,2,3,4,5,", "\"\" is no number"),

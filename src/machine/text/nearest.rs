@@ -1,7 +1,7 @@
 //! Nearest of several names, for a name with a mistake in writing.
 
 /// The name that differs least from a written one, if it differs in at most a third of the characters.
-pub(super) fn nearest<'n>(written: &str, names: &[&'n str]) -> Option<&'n str> {
+pub fn nearest<'n>(written: &str, names: &[&'n str]) -> Option<&'n str> {
     let most = (written.chars().count() / 3).max(1);
     let distances = names.iter().map(|name| (distance(written, name), *name));
     distances.filter(|(distance, _)| *distance <= most).min().map(|(_, name)| name)
