@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 use sha1_smol::Sha1;
 use tracing::{error, info};
 
-use super::threads::STACK_BYTES;
 use hexad_core::model::LEGS;
 use hexad_machine::config::Config;
 use hexad_machine::log::utc_now;
@@ -103,7 +102,7 @@ impl LegConfirmation {
             let kept = written.map(|()| format!("kept in {}", this.path.display()));
             let _ = sender.send(kept.map_err(|error| error.to_string()));
         };
-        if let Err(error) = Builder::new().name("hexad-legs".into()).stack_size(STACK_BYTES).spawn(write) {
+        if let Err(error) = Builder::new().name("hexad-legs".into()).spawn(write) {
             let _ = failed.send(Err(format!("no thread can write the file: {error}")));
         }
         receiver
