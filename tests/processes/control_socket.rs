@@ -31,7 +31,7 @@ fn every_line_has_its_answer() {
         ),
         (
             "{\"version\": 1, \"request\": \"dance\"}\n",
-            "unknown request \"dance\"; must be one of status, record, reload, goto, hold, jog, ride_start, ride_end, engage, clear, park, stop, off, estop",
+            "unknown request \"dance\"; must be one of status, record, reload, goto, hold, jog, confirm_legs, ride_start, ride_end, engage, clear, park, stop, off, estop",
         ),
         ("{\"version\": 1, \"request\": \"engage\", \"wiat\": true}\n", "unknown field `wiat`"),
         ("{\"version\": 1, \"request\": \"record\"}\n", "record needs an open file"),
@@ -39,6 +39,13 @@ fn every_line_has_its_answer() {
         client.send(line);
         let answer = client.answer();
         assert_eq!(answer["result"], "invalid");
+        assert!(answer["text"].as_str().is_some_and(|text| text.contains(words)), "{answer}");
+    }
+    for (key, words) in
+        [("geometry_sha1", "another name or other joints"), ("remote", "confirmed on this host")]
+    {
+        let answer = client.ask("confirm_legs", &json!({key: "elsewhere", "legs": [1, 2, 3, 4, 5, 6]}));
+        assert_eq!(answer["result"], "refused");
         assert!(answer["text"].as_str().is_some_and(|text| text.contains(words)), "{answer}");
     }
     // Nothing of that stopped it. Several lines at once, and one in pieces.
