@@ -41,6 +41,13 @@ fn every_line_has_its_answer() {
         assert_eq!(answer["result"], "invalid");
         assert!(answer["text"].as_str().is_some_and(|text| text.contains(words)), "{answer}");
     }
+    for (key, words) in
+        [("geometry_sha1", "another name or other joints"), ("remote", "confirmed on this host")]
+    {
+        let answer = client.ask("confirm_legs", &json!({key: "elsewhere", "legs": [1, 2, 3, 4, 5, 6]}));
+        assert_eq!(answer["result"], "refused");
+        assert!(answer["text"].as_str().is_some_and(|text| text.contains(words)), "{answer}");
+    }
     // Nothing of that stopped it. Several lines at once, and one in pieces.
     client.send(
         "{\"version\": 1, \"request\": \"status\"}\n{\"version\": 1, \"request\": \"clear\"}\n{\"version\": 1, ",
