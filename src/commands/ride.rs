@@ -47,11 +47,12 @@ impl RideArguments {
             Order::Start => RideOrder::Start,
             Order::End => RideOrder::End,
         };
-        let (name, stop) = (machine_name(machine.path())?, Stop::on_signals()?);
+        let name = machine_name(machine.path())?;
         if order == RideOrder::Start && !yes {
             yes = is_doubt_accepted(&name)?;
         }
-        let within = Duration::from_secs_f64(within);
+        // After the question, which Ctrl-C ends as usual.
+        let (within, stop) = (Duration::from_secs_f64(within), Stop::on_signals()?);
         let answer = ride(&name, order, yes, within, || stop.is_requested())?;
         match answer.result {
             RequestResult::Done => Ok(print(match order {
