@@ -188,6 +188,43 @@ mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
 
+    /// A receiver of this host, and what sends to it from a port of its own.
+    fn receiver() -> (Receiver, impl Fn(&UdpSocket)) {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let options = StreamOptions { format: Some("flypt-mover".into()), ..StreamOptions::default() };
+        let receiver = Receiver::open(&config, "127.0.0.1:0".parse().unwrap(), &options).unwrap();
+        let to = receiver.socket.local_addr().unwrap();
+        (receiver, move |socket| assert_eq!(socket.send_to(b"1,2,3,0,0,0", to).unwrap(), 11))
+    }
+
+    #[test]
+    fn a_second_program_counts_only_when_the_first_is_silent_and_has_begun_anew_then() {
+        let (mut receiver, send) = receiver();
+        let [first, second] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+        // However long this host pauses.
+        receiver.pause_s = 60.0;
+        (0..3).for_each(|_| send(&first));
+        assert!(receiver.newest().is_some());
+        send(&second);
+        assert!(
+            receiver.newest().is_none() && receiver.description().contains("end one of the two programs")
+        );
+        send(&first);
+        assert!(receiver.newest().is_some() && !receiver.take_restart());
+        receiver.pause_s = 0.0;
+        send(&second);
+        assert!(receiver.newest().is_some() && receiver.take_restart() && !receiver.take_restart());
+    }
+
+    #[test]
+    fn a_program_may_send_each_datagram_from_another_port() {
+        let (mut receiver, send) = receiver();
+        for _ in 0..20 {
+            send(&UdpSocket::bind("127.0.0.1:0").unwrap());
+            assert!(receiver.newest().is_some() && !receiver.take_restart(), "{}", receiver.description());
+        }
+    }
+
     #[test]
     fn broadcasts_arrive_at_the_broadcast_address_and_what_is_rejected_is_counted() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
