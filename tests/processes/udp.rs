@@ -144,7 +144,7 @@ fn ride() -> Ride {
         println!("RMS {:.3} mm after a lag of {:.0} ms", 1e3 * rms, 1e3 * lag);
         rms
     });
-    let pauses = ended.stderr.matches("a pause: the platform stands").count();
+    let pauses = ended.stderr.matches("a pause: the platform comes to rest").count();
     Ride { pauses, deviation_m: deviations[0].max(deviations[1]) }
 }
 
