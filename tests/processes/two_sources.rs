@@ -125,6 +125,7 @@ fn control_does_not_begin_beside_a_stopped_driver() {
     clear(&machine);
     machine.hexad::<&str>("plant", &[]).fails(2, "stopped by SIGSTOP");
     machine.hexad("status", &[""; 0]).succeeds().find("STOPPED").expect("it is shown");
+    is_refused(&machine, "engage", &[], "no measurements come from process");
     let second = publish(&machine, lengths);
     let_pass(SILENCE);
     is_refused(&machine, "engage", &[], &format!("only kill -KILL {} ends it", plant.id()));

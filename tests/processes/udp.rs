@@ -76,10 +76,11 @@ const SHOWN: [&str; 3] = [
     "--boarding 0,0,0,1.08m,0,0",
 ];
 
-/// What happened in a ride: pauses that the player saw, and largest RMS deviation from the flight \[m\].
+/// What happened in a ride: pauses that the player saw, largest RMS deviation from the flight \[m\], and largest lag \[s\].
 struct Ride {
     pauses: usize,
     deviation_m: f64,
+    lag_s: f64,
 }
 
 /// Boarding, a flight with a pause, jumps, boarding.
@@ -142,10 +143,11 @@ fn ride() -> Ride {
         // After the blend.
         let [rms, lag] = deviation(&measured, began_ns, [from_ns + 3_500_000_000, to_ns]);
         println!("RMS {:.3} mm after a lag of {:.0} ms", 1e3 * rms, 1e3 * lag);
-        rms
+        [rms, lag]
     });
+    let largest = |of: usize| deviations.iter().map(|it| it[of]).fold(0.0, f64::max);
     let pauses = ended.stderr.matches("a pause: the platform comes to rest").count();
-    Ride { pauses, deviation_m: deviations[0].max(deviations[1]) }
+    Ride { pauses, deviation_m: largest(0), lag_s: largest(1) }
 }
 
 /// Largest velocity of the platform over 10 ms \[m/s\].
@@ -163,8 +165,9 @@ fn fastest(measured: &[MeasuredMessage]) -> f64 {
 #[ignore = "second tier: takes long"]
 #[apply(beside_others)]
 fn a_flight_with_losses_pauses_and_jumps_is_followed_within_the_limits() {
-    let undisturbed = (0..3).map(|_| ride()).find(|ride| ride.pauses == 1);
-    let ride = undisturbed.expect("three rides with a single pause in none of them");
+    // Twice the interval of the datagrams, and as much for their jitter.
+    let undisturbed = (0..3).map(|_| ride()).find(|ride| ride.pauses == 1 && ride.lag_s < 4.0 / 60.0);
+    let ride = undisturbed.expect("three rides with a single pause and a short lag in none of them");
     assert!(ride.deviation_m < 4e-3, "{} m", ride.deviation_m);
 }
 
@@ -262,7 +265,7 @@ fn a_dry_run_shows_a_stream_and_what_the_limits_change_and_names_wrong_units() {
     of_scale(0.0, "0.2").fails(1, "no datagram has arrived: the program does not send");
     assert!(!fs::exists(&picture).unwrap());
     let text = of_scale(1.0, "1").succeeds();
-    for words in ["datagrams accepted", "% missing", "lowest", "the platform would follow within"] {
+    for words in ["datagrams accepted", "% missing", "lowest", "the platform would follow "] {
         assert!(text.contains(words), "{words}: {text}");
     }
     assert!(fs::read_to_string(&picture).unwrap().contains("</svg>"));
@@ -308,6 +311,8 @@ fn only_the_operator_begins_a_ride() {
                 operator.machine.hexad("move", &["--resume"]).succeeds();
                 let ridings = || player.words().matches("follows the stream").count();
                 player.waits(|| ridings() == 2, "go on");
+                // The daemon knows it with the next status.
+                let_pass(Duration::from_millis(300));
                 operator.orders(&["end"], "boarding");
             }
             "end" => operator.orders(&["end"], "boarding"),

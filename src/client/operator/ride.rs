@@ -17,8 +17,10 @@ pub enum RidePhase {
     Doubtful,
     /// It follows the stream.
     Riding,
-    /// It stands where the stream or the operator paused.
+    /// It stands, as the stream paused.
     Paused,
+    /// It stands, as the operator paused it.
+    PausedByOperator,
 }
 
 impl RidePhase {
@@ -30,6 +32,7 @@ impl RidePhase {
             Self::Doubtful => "doubtful",
             Self::Riding => "riding",
             Self::Paused => "paused",
+            Self::PausedByOperator => "paused_by_operator",
         }
     }
 }
@@ -78,7 +81,8 @@ impl RideOrder {
                 "the stream looks as if it had other units than its format; hexad ride start --yes begins anyway",
             ),
             (Self::Start, RidePhase::Boarding) => Refused("the platform is on its way to the boarding pose"),
-            (Self::Start, RidePhase::Paused) => Refused("the source is paused; hexad move --resume goes on"),
+            (Self::Start, RidePhase::Paused) => Refused("the ride goes on with its stream, which pauses"),
+            (_, RidePhase::PausedByOperator) => Refused("the source is paused; hexad move --resume goes on"),
             (Self::End, _) => Reached("no ride is in progress"),
         }
     }

@@ -67,7 +67,7 @@ pub(super) struct Playback<'a> {
     last_active_ns: u64,
     /// Instant of the next question whether the platform is held for a source that has ended \[ns\].
     next_inquiry_ns: u64,
-    /// Reason for waiting, as last logged.
+    /// Reason for waiting, as last logged, without its numbers.
     reason: String,
     /// Whether the platform is to stand under control at the end of the motion.
     is_to_hold: bool,
@@ -350,10 +350,12 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
+    /// Logs a reason once, however its numbers change.
     fn log_reason(&mut self, reason: &str) {
-        if self.reason != reason {
+        let words = |text: &str| text.split(|c: char| c.is_ascii_digit()).collect::<String>();
+        if self.reason != words(reason) {
             info!("{reason}");
-            self.reason = reason.into();
+            self.reason = words(reason);
         }
     }
 }

@@ -14,7 +14,7 @@ use super::{MAX_WITHIN_S, Server};
 use crate::control_socket::answer::answer_line;
 use crate::leg_confirmation::{IN_ORDER, geometry_sha1};
 use crate::motion_requests::order::MotionOrder;
-use crate::process_names::sentence;
+use crate::process_names::{is_stopped, named, sentence};
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::{GOTO, HOLD, JOG};
 use hexad_client::operator::protocol::{AnswerLine, CONFIRM_LEGS, RequestLine, RequestResult, STOPPED};
@@ -248,6 +248,11 @@ impl Server<'_> {
             let two = Diagnostic::new(DiagnosticCode::TwoMeasuredSources, used.into(), ignored.into());
             let text = sentence(&two);
             return Some(answer_line(RequestResult::Refused, &line.request, state, &two, text));
+        }
+        let mut drivers = self.status.drivers().into_iter().filter(|_| !line.until_ready);
+        if let Some(stopped) = drivers.find(|driver| is_stopped(*driver)) {
+            let text = format!("no measurements come from {}", named(stopped));
+            return answer(RequestResult::Refused, DiagnosticCode::MeasurementLost, &text);
         }
         let text = "the daemon was held and the request may be old; send it again";
         let is_stale = self.woke_ns < self.stale_until_ns;

@@ -221,7 +221,7 @@ impl StatusSource {
             condition_limit: deployment.limits.condition,
             time_to_singularity_s: Some(status.time_to_singularity_s)
                 .filter(|time_s| is_known && time_s.is_finite()),
-            legs: legs(snapshot),
+            legs: legs(snapshot, now_ns, deployment.timeouts.measured_s),
             stroke_m: [machine.actuator.min_length, machine.actuator.max_length],
             resolution: loaded.config.resolution(),
             max_force_n: machine.actuator.max_force,
@@ -290,9 +290,11 @@ fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
     }
 }
 
-fn legs(snapshot: &Snapshot) -> Vec<LegReport> {
+/// The legs. Rates that are older than the timeout are of the past, as of a driver that has ended in motion.
+fn legs(snapshot: &Snapshot, now_ns: u64, timeout_s: f64) -> Vec<LegReport> {
     let Some(measurement) = &snapshot.measurement else { return vec![] };
-    let rates = measurement.rate.map_or([None; LEGS], |rate| rate.map(Some));
+    let is_new = snapshot.status.pose_valid == 1 || seconds(measurement.time_ns, now_ns) < timeout_s;
+    let rates = measurement.rate.filter(|_| is_new).map_or([None; LEGS], |rate| rate.map(Some));
     let numbers = measurement.length.iter().zip(rates).zip(&snapshot.force).take(LEGS);
     numbers
         .map(|((length, rate), force)| LegReport { length_m: *length, rate_m_s: rate, force_n: *force })

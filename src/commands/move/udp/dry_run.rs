@@ -6,10 +6,8 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use nalgebra::Vector6;
-
 use super::receiver::{Arrived, Receiver, SILENCE_CAUSES};
-use super::stream::{StreamError, StreamOptions, blended, seconds};
+use super::stream::{BLEND_S, StreamError, StreamOptions, blended, seconds};
 use super::survey::StreamSurvey;
 use crate::commands::progress::time_bar;
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
@@ -27,8 +25,9 @@ use hexad_machine::text::files::print;
 use hexad_machine::text::numbers::{AXES, axis_unit, percent, significant};
 use hexad_machine::text::units::MotionUnits;
 
-/// Ranges of coordinates below which nobody feels a motion \[rad\], \[m\].
-const STANDING: [f64; 6] = [2e-3, 2e-3, 2e-3, 1e-3, 1e-3, 1e-3];
+/// Ranges below which nobody feels a motion \[rad\], \[m\].
+const STANDING_RAD: f64 = 2e-3;
+const STANDING_M: f64 = 1e-3;
 
 /// Time between two looks at the socket.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
@@ -51,17 +50,22 @@ pub fn run(
     let constants = constants(config);
     let mut survey = StreamSurvey::over(duration_s);
     arrived.iter().for_each(|it| survey.add(&constants, it.arrival_ns, &it.x));
-    let home = Vector6::from(config.machine.home);
-    let [low, high] = survey.range.unwrap_or_default().map(|x| (Vector6::from(x) - home).into());
+    let [low, high] = survey.range.unwrap_or_default();
     let span_s = seconds(first.arrival_ns, last.arrival_ns);
     let mut text = format!("{} in {span_s:.1} s, {}\n", receiver.description(), timing(&arrived));
     let format = CoordinateFormat::new(MotionUnits::default(), config.resolution());
     text += &format.table("about home", &[("lowest", Some(low), 0), ("highest", Some(high), 0)]);
     let followed = Followed::new(config, &arrived);
     let _ = writeln!(text, "{}", followed.summary());
-    if Vector6::from(high) - Vector6::from(low) < Vector6::from(STANDING) {
-        text +=
-            "it hardly moves: is it in its menu, or are its numbers in larger units than its format says?\n";
+    let ranges: Vec<_> = high.iter().zip(low).map(|(high, low)| high - low).collect();
+    for (name, ranges, least) in
+        [("its angles", ranges.get(..3), STANDING_RAD), ("its positions", ranges.get(3..), STANDING_M)]
+    {
+        let widest = ranges.into_iter().flatten().copied().fold(0.0, f64::max);
+        if widest > 0.0 && widest < least {
+            let _ =
+                writeln!(text, "{name} hardly change: are the numbers in larger units than the format says?");
+        }
     }
     if let Some(path) = &options.output {
         followed.draw(path, config)?;
@@ -120,7 +124,10 @@ struct Followed {
     cycles: Vec<Cycle>,
     /// Largest deviation \[m\], \[rad\].
     deviation: [f64; 2],
-    /// Cycles at a limit, and which.
+    /// Delay of the wanted motion behind the stream \[s\].
+    delay_s: f64,
+    /// Cycles that count, those at a limit, and which.
+    counted: usize,
     limited: usize,
     limits: LimitSet,
 }
@@ -139,38 +146,54 @@ impl Followed {
         let (mut samples, mut waiting) = (PoseSamples::default(), arrived.iter().peekable());
         let mut now_ns = first_ns;
         let (cycles, limits) = (vec![], LimitSet::default());
-        let mut followed = Self { cycles, deviation: [0.0; 2], limited: 0, limits };
+        // The start from rest, in which nobody sees the interval of the poses yet, counts as little as it lasts.
+        let last_ns = arrived.last().map_or(0, |it| it.arrival_ns);
+        let after_s = BLEND_S.min(0.5 * seconds(first_ns, last_ns));
+        let mut followed = Self { cycles, deviation: [0.0; 2], delay_s: 0.0, counted: 0, limited: 0, limits };
         while waiting.peek().is_some() {
             while let Some(it) = waiting.next_if(|it| it.arrival_ns <= now_ns) {
                 let x = blended(&home, &it.x, first_ns, it.arrival_ns);
                 samples.push(now_ns, it.time_ns, &pose_of(&x));
             }
             reference.advance(&constants, now_ns, Some(&Target::Samples(&samples)));
-            followed.add(seconds(first_ns, now_ns), &reference, samples.target(now_ns), &home);
+            followed.add(seconds(first_ns, now_ns), &reference, samples.target(now_ns), &home, after_s);
             now_ns += period_ns;
         }
+        followed.delay_s = samples.delay_s(now_ns);
         followed
     }
 
-    fn add(&mut self, t: f64, reference: &ReferenceGenerator, wanted: Option<Motion>, home: &[f64; 6]) {
+    fn add(
+        &mut self,
+        t: f64,
+        reference: &ReferenceGenerator,
+        wanted: Option<Motion>,
+        home: &[f64; 6],
+        after_s: f64,
+    ) {
         let (wanted, present) = (wanted.map_or(pose_of(home), |it| it.pose), reference.motion().pose);
+        self.cycles.push((t, task_coordinates(&wanted, home), task_coordinates(&present, home)));
+        if t < after_s {
+            return;
+        }
+        self.counted += 1;
         let error = wanted.displacement_to(&present);
         for (largest, error) in self.deviation.iter_mut().zip([error.linear.norm(), error.angular.norm()]) {
             *largest = largest.max(error);
         }
         self.limited += usize::from(!reference.active_limits().is_empty());
         self.limits = self.limits.union(reference.active_limits());
-        self.cycles.push((t, task_coordinates(&wanted, home), task_coordinates(&present, home)));
     }
 
     fn summary(&self) -> String {
         let [mm, deg] = [1e3 * self.deviation[0], self.deviation[1].to_degrees()].map(significant);
-        let share = percent(self.limited as f64 / self.cycles.len().max(1) as f64);
+        let late = significant(1e3 * self.delay_s);
+        let share = percent(self.limited as f64 / self.counted.max(1) as f64);
         let names = Limit::ALL.into_iter().filter(|it| self.limits.contains(*it)).map(Limit::name);
         let names: Vec<_> = names.collect();
         let of = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
         format!(
-            "the platform would follow within {mm} mm and {deg} deg, at a limit for {share} of the time{of}"
+            "the platform would follow {late} ms later, within {mm} mm and {deg} deg, at a limit for {share} of the time{of}"
         )
     }
 

@@ -83,7 +83,8 @@ pub fn follow(
     let [_, _, _, x, y, z] = boarding.map(|coordinate| fixed(1e3 * coordinate, 0));
     info!(%address, "moves to the boarding pose (x, y, z = {x}, {y}, {z} mm)");
     let survey = StreamSurvey::over(SURVEY_S);
-    let mut ride = Ride { source, receiver, survey, boarding, constants: &constants, phase: Phase::Boarding };
+    let (phase, is_leaving) = (Phase::Boarding, false);
+    let mut ride = Ride { source, receiver, survey, boarding, constants: &constants, phase, is_leaving };
     while !stop.is_repeated() && ride.step(pause.is_requested(), stop.is_requested())? {}
     info!("{}", ride.receiver.description());
     if !stop.is_repeated() {
@@ -115,6 +116,8 @@ struct Ride<'a> {
     boarding: [f64; 6],
     constants: &'a Constants,
     phase: Phase,
+    /// Whether a signal has come.
+    is_leaving: bool,
 }
 
 impl Ride<'_> {
@@ -123,11 +126,15 @@ impl Ride<'_> {
         let (newest, now_ns) = (self.receiver.newest(), monotonic_ns());
         newest.iter().for_each(|it| self.survey(it));
         let order = self.describe(is_paused);
-        if is_ending && !matches!(self.phase, Phase::Leaving) {
-            info!("moves to the boarding pose; once more ends at once");
+        if is_ending && !core::mem::replace(&mut self.is_leaving, is_ending) {
+            let paused = if is_paused { ", after hexad move --resume" } else { "" };
+            info!("moves to the boarding pose{paused}; once more ends at once");
+        }
+        if is_ending && !is_paused {
             self.phase = Phase::Leaving;
         }
         match self.phase {
+            Phase::Leaving if is_paused => self.pause(false, now_ns)?,
             Phase::Leaving => {
                 self.source.publish(self.boarding)?;
                 return Ok(!self.has_boarded()?);
@@ -163,10 +170,10 @@ impl Ride<'_> {
             }
             Phase::Pause { x, since_ns, rides } => {
                 self.source.publish(x)?;
-                if order == Some(RideOrder::End) {
-                    self.board("the operator ends the ride");
-                } else if is_paused {
+                if is_paused {
                     self.phase = Phase::Pause { x, since_ns: now_ns, rides };
+                } else if order == Some(RideOrder::End) {
+                    self.board("the operator ends the ride");
                 } else if !rides {
                     self.board("the pause has ended");
                 } else if self.receiver.take_restart() {
@@ -256,8 +263,8 @@ impl Phase {
     /// The phase as the operator sees it.
     fn shown(&self, is_paused: bool, is_doubtful: bool) -> RidePhase {
         match self {
+            _ if is_paused => RidePhase::PausedByOperator,
             Self::Boarding | Self::Leaving => RidePhase::Boarding,
-            Self::Ready if is_paused => RidePhase::Paused,
             Self::Ready if is_doubtful => RidePhase::Doubtful,
             Self::Ready => RidePhase::Ready,
             Self::Following { .. } => RidePhase::Riding,

@@ -62,6 +62,8 @@ pub struct Receiver {
     last_ns: u64,
     /// The program whose datagrams count, by its address, and their number.
     sender: Option<(SocketAddr, u64)>,
+    /// Its last datagram, followed or not \[ns\].
+    heard_ns: u64,
     /// Whether the program that sends has begun anew.
     has_restarted: bool,
     /// Datagrams since the last pause.
@@ -95,6 +97,7 @@ impl Receiver {
             pause_s: PAUSE_S.min(PAUSE_SHARE * timeout_s),
             last_ns: 0,
             sender: None,
+            heard_ns: 0,
             has_restarted: false,
             lively: 0,
             accepted: 0,
@@ -153,17 +156,18 @@ impl Receiver {
         // A program that is started again has another port. Some have another for each datagram.
         let (before, count) = self.sender.unwrap_or((sender, 0));
         let is_restart = before != sender && count > 1;
-        if is_restart && self.silence_s(arrival_ns) <= self.pause_s {
+        if is_restart && seconds(self.heard_ns, arrival_ns) <= self.pause_s {
             return Err(Rejection::Second(sender, before));
         }
         self.sender = Some((sender, if before == sender { count.saturating_add(1) } else { 1 }));
+        (self.heard_ns, self.has_restarted) = (arrival_ns, self.has_restarted || is_restart);
         let lives = self.clock.lives();
         let time_ns = match stamp_s {
             Some(stamp_s) => self.clock.instant((stamp_s * 1e9) as i64, arrival_ns as i64)?.time_ns,
             None => arrival_ns as i64,
         };
         let is_pause = self.silence_s(arrival_ns) > self.pause_s;
-        self.has_restarted |= is_restart || self.clock.lives() != lives;
+        self.has_restarted |= self.clock.lives() != lives;
         self.lively = if is_pause { 0 } else { self.lively.saturating_add(1) };
         (self.last_ns, self.accepted) = (arrival_ns, self.accepted + 1);
         Ok(Arrived { arrival_ns, time_ns: time_ns as u64, x })

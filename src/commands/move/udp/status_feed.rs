@@ -64,9 +64,15 @@ impl StatusFeed {
                     (shared.input.take(), shared.phase)
                 };
                 let answer = status_for_source(&name, input, phase);
-                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
-                shared.order = phase.zip(answer.as_ref().ok().and_then(order_for_this_process));
-                shared.receive(requested_ns, answer, &home);
+                let order = phase.zip(answer.as_ref().ok().and_then(order_for_this_process));
+                shared.lock().unwrap_or_else(PoisonError::into_inner).receive(
+                    requested_ns,
+                    answer,
+                    order,
+                    &home,
+                );
+                // Nothing is held while it sleeps: neither the lock, for which the setpoints would wait, nor what ends this thread.
+                drop(shared);
                 sleep(INTERVAL);
             }
         });
@@ -117,7 +123,14 @@ fn order_for_this_process(answer: &Answer) -> Option<RideOrder> {
 }
 
 impl Watched {
-    fn receive(&mut self, requested_ns: u64, answer: Result<Answer, OperatorError>, home: &[f64; 6]) {
+    fn receive(
+        &mut self,
+        requested_ns: u64,
+        answer: Result<Answer, OperatorError>,
+        order: Option<(RidePhase, RideOrder)>,
+        home: &[f64; 6],
+    ) {
+        self.order = order;
         let seen = answer.map(|answer| Observation::of_answer(&answer, requested_ns, home));
         match seen {
             Ok(seen) => {

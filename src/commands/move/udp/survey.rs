@@ -16,6 +16,9 @@ const LEAST_S: f64 = 2.0;
 /// Longest time between two poses whose difference counts as a velocity \[s\].
 const MAX_STEP_S: f64 = 0.25;
 
+/// Fewest poses by which they are judged.
+const LEAST_POSES: f64 = 9.0;
+
 /// Largest share of poses outside of the workspace that is a matter of scale, not of units.
 const MAX_OUTSIDE: f64 = 0.05;
 
@@ -26,7 +29,7 @@ pub struct StreamSurvey {
     memory_s: f64,
     poses: f64,
     last: Option<(u64, [f64; 6])>,
-    /// Lowest and highest coordinates.
+    /// Lowest and highest coordinates, about home.
     pub range: Option<[[f64; 6]; 2]>,
     /// Poses outside of the workspace, and the bound that one exceeds.
     outside: f64,
@@ -49,8 +52,8 @@ impl StreamSurvey {
     pub fn add(&mut self, constants: &Constants, arrival_ns: u64, x: &[f64; 6]) {
         let limits = &constants.parameters.limits;
         self.limits = [limits.position.velocity, limits.orientation.velocity];
-        let [low, high] = self.range.unwrap_or([*x; 2]);
-        let [low, high, new] = [low, high, *x].map(Vector6::from);
+        let new = Vector6::from(*x) - Vector6::from(constants.machine().home);
+        let [low, high] = self.range.unwrap_or([new.into(); 2]).map(Vector6::from);
         self.range = Some([low.inf(&new).into(), high.sup(&new).into()]);
         let before = self.last.replace((arrival_ns, *x));
         if let Some((before_ns, _)) = before {
@@ -83,7 +86,7 @@ impl StreamSurvey {
     pub fn doubt(&self) -> Option<String> {
         let share = self.outside / self.poses.max(1.0);
         let [way, angle] = [self.way, self.angle].map(|moved| moved / self.time_s.max(LEAST_S));
-        let outside = self.bound.filter(|_| share > MAX_OUTSIDE).map(|bound| {
+        let outside = self.bound.filter(|_| share > MAX_OUTSIDE && self.poses > LEAST_POSES).map(|bound| {
             format!("{} of its last poses are outside of the workspace, as by {bound}", percent(share))
         });
         let fast = |value: f64, limit: f64, unit: &str| {
@@ -95,7 +98,7 @@ impl StreamSurvey {
             .or_else(|| (way > slow).then(|| fast(1e3 * way, 1e3 * slow, "mm/s")))
             .or_else(|| (angle > calm).then(|| fast(angle.to_degrees(), calm.to_degrees(), "deg/s")))?;
         Some(format!(
-            "do its units, or its scale, differ from its format? {reason}; until now {}",
+            "do its units, or its scale, differ from its format? {reason}; until now, about home, {}",
             self.ranges()
         ))
     }
