@@ -126,13 +126,7 @@ impl Ride<'_> {
         let (newest, now_ns) = (self.receiver.newest(), monotonic_ns());
         newest.iter().for_each(|it| self.survey(it));
         let order = self.describe(is_paused);
-        if is_ending && !core::mem::replace(&mut self.is_leaving, is_ending) {
-            let paused = if is_paused { ", after hexad move --resume" } else { "" };
-            info!("moves to the boarding pose{paused}; once more ends at once");
-        }
-        if is_ending && !is_paused {
-            self.phase = Phase::Leaving;
-        }
+        self.leave(is_paused, is_ending);
         match self.phase {
             Phase::Leaving if is_paused => self.pause(false, now_ns)?,
             Phase::Leaving => {
@@ -186,6 +180,17 @@ impl Ride<'_> {
             }
         }
         Ok(true)
+    }
+
+    /// After a signal moves to the boarding pose for good, but not while it is paused.
+    fn leave(&mut self, is_paused: bool, is_ending: bool) {
+        if is_ending && !core::mem::replace(&mut self.is_leaving, is_ending) {
+            let paused = if is_paused { ", after hexad move --resume" } else { "" };
+            info!("moves to the boarding pose{paused}; once more ends at once");
+        }
+        if is_ending && !is_paused {
+            self.phase = Phase::Leaving;
+        }
     }
 
     /// Examines a pose of the stream.
