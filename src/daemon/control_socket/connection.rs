@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use tracing::{info, warn};
 
@@ -147,6 +148,12 @@ impl Connection {
         waits || line.is_some() || *waits_for_motion
     }
 
+    /// Whether the client has closed the connection, and not only its input.
+    pub fn has_left(&self) -> bool {
+        let mut event = [PollFd::new(self.stream.as_fd(), PollFlags::empty())];
+        poll(&mut event, PollTimeout::ZERO).is_ok_and(|count| count > 0)
+    }
+
     /// Reads at most the length of one line, and returns the next complete line.
     pub fn receive(&mut self, now_ns: u64) -> Received {
         let mut bytes = [0; MAX_LINE_BYTES];
@@ -226,10 +233,11 @@ impl Connection {
 
 impl Drop for Connection {
     fn drop(&mut self) {
-        let Self { pending, reload, pending_file, .. } = self;
+        let Self { pending, reload, pending_file, ride, .. } = self;
         let requests = [
             pending.take().map(|(request, _)| request),
             reload.take().map(|(request, _)| request),
+            ride.take().map(|(request, _)| request),
             pending_file.take().map(|(request, _)| request),
         ];
         requests.into_iter().flatten().for_each(OpenRequest::forget);

@@ -165,8 +165,8 @@ impl Server<'_> {
         }
     }
 
-    /// Answers the orders for rides that have ended, and shows the others to their sources. An order ends with the connection of who
-    /// gave it.
+    /// Answers the orders for rides that have ended, and shows the others to their sources. An order ends when its client leaves, also
+    /// one that left before the order was read.
     pub(super) fn advance_rides(&mut self) {
         let (snapshot, now_ns, stops) = (*self.snapshots.read(), self.woke_ns, self.stops());
         let rider = self.status.rider(now_ns);
@@ -174,6 +174,10 @@ impl Server<'_> {
         let mut orders = vec![];
         self.connections.retain_mut(|connection| {
             let Some((request, ride)) = connection.ride.take() else { return true };
+            if connection.has_left() {
+                request.forget();
+                return true;
+            }
             let input = status.input(ride.source);
             if let Some(answer) = ride.answer(rider, stops, input, &snapshot, now_ns) {
                 connection.peer.log_failure(&answer);

@@ -1,7 +1,7 @@
 //! The control thread against a loop and a motion thread of a few lines, in random orders of requests, waits, stops, delays, lost
 //! clients and new starts: after a stop nothing takes control that was asked for before it, and each request has one answer.
 
-use core::sync::atomic::AtomicU64;
+use core::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -19,7 +19,7 @@ use hexad_core::control::signals::state::{Request, State};
 use hexad_core::model::random::Random;
 use hexad_machine::config::Config;
 
-static NOW_NS: AtomicU64 = AtomicU64::new(1_000_000_000);
+thread_local!(static NOW_NS: Cell<u64> = const { Cell::new(1_000_000_000) });
 static NOBODY_ENDS: AtomicBool = AtomicBool::new(false);
 
 const KINDS: [&str; 18] = [
@@ -118,7 +118,7 @@ impl World {
             is_ending: &NOBODY_ENDS,
         };
         let mut server = Server::new(Arc::new(Loaded::new(config)), links);
-        server.clock = || NOW_NS.load(Ordering::Relaxed);
+        server.clock = || NOW_NS.get();
         let mut world = Self {
             server,
             snapshots,
@@ -172,11 +172,11 @@ impl World {
             6 => self.advance_motion(),
             7 if self.below(4) == 0 => {
                 let request = if self.below(2) == 0 { Request::Stop } else { Request::Estop };
-                let _ = self.server.word.post(request as u32, NOW_NS.load(Ordering::Relaxed));
+                let _ = self.server.word.post(request as u32, NOW_NS.get());
             }
             8 if self.below(8) == 0 => self.lose_client(),
             9 if self.below(16) == 0 => self.begin_anew(),
-            10 => drop(NOW_NS.fetch_add(120_000_000, Ordering::Relaxed)),
+            10 => NOW_NS.set(NOW_NS.get() + 120_000_000),
             11..13 => self.cycle(),
             _ => self.round(),
         }
@@ -264,7 +264,7 @@ impl World {
                 state => state,
             };
         }
-        self.snapshot.time_ns = NOW_NS.load(Ordering::Relaxed);
+        self.snapshot.time_ns = NOW_NS.get();
         self.snapshot.status.state = self.state as u32;
         self.snapshots.write(self.snapshot);
     }
@@ -360,7 +360,7 @@ impl World {
             (phase, _) => phase,
         };
         let line = RequestLine { ride: Some(self.phase), ..RequestLine::new("status") };
-        self.server.status.describe_source(RIDER, &line, NOW_NS.load(Ordering::Relaxed));
+        self.server.status.describe_source(RIDER, &line, NOW_NS.get());
     }
 
     /// A round of the control thread, and what its clients receive.
@@ -419,7 +419,7 @@ fn search(seed: u64, runs: u64) {
         for _ in 0..200 {
             world.step += 1;
             world.send_due();
-            NOW_NS.fetch_add(110_000_000, Ordering::Relaxed);
+            NOW_NS.set(NOW_NS.get() + 110_000_000);
             world.advance_motion();
             world.cycle();
             world.round();
