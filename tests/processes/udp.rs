@@ -217,6 +217,8 @@ impl Operator {
         player.says("moves to the boarding pose");
         if pose(&self.machine)[3] > 1.09 {
             self.machine.hexad("move", &["--pause"]).succeeds();
+            // The setpoints rest; the platform follows them.
+            let_pass(Duration::from_millis(200));
             let stood = pose(&self.machine)[3];
             let_pass(Duration::from_millis(300));
             let stands = pose(&self.machine)[3];
