@@ -219,24 +219,27 @@ impl Plant<'_> {
     fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
-        let asked_hz = optimum_hz(disturbance, noise.length_m, period_s);
+        let optimum_hz = optimum_hz(disturbance, noise.length_m, period_s);
         let ratio = if drive.delay_s.is_some() { ESTIMATOR_RATIO } else { ESTIMATOR_RATIO_DELAY_UNKNOWN };
-        let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
+        let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(f64::INFINITY, f64::min);
         // Another value in the file is wrong.
-        if !(largest_hz.is_finite() && largest_hz > 0.0) {
+        if !(largest_hz.min(optimum_hz).is_finite() && largest_hz.min(optimum_hz) > 0.0) {
             return f64::NAN;
         }
-        let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * libm::pow(0.8, step.into()));
-        let candidates: Vec<_> = slower.chain(loops.iter().map(|(hertz, ..)| *hertz)).collect();
         let first = |is_stable: fn(&SampledLoop) -> bool| {
-            candidates.iter().copied().find(|estimator_hz| {
+            let is_stable_with = |estimator_hz: &f64| {
                 loops.iter().all(|(hertz, sampled, gain)| {
                     let (wn_t, estimator_ratio) = (TAU * hertz * period_s, estimator_hz / hertz);
                     is_stable(&SampledLoop { wn_t, estimator_ratio, ..*sampled }.with_feedback_gain(*gain))
                 })
-            })
+            };
+            // These steps do not depend on the noise, so that more noise never makes the estimator faster.
+            let mut steps = (0..ESTIMATOR_STEPS).map(|step| largest_hz * libm::pow(0.8, step.into()));
+            let slowed = steps.find(is_stable_with).map(|hertz| hertz.min(optimum_hz)).filter(is_stable_with);
+            slowed.or_else(|| loops.iter().map(|(hertz, ..)| *hertz).find(is_stable_with))
         };
-        first(is_stable_with_masses).or_else(|| first(SampledLoop::is_stable)).unwrap_or(largest_hz)
+        let stable = first(is_stable_with_masses).or_else(|| first(SampledLoop::is_stable));
+        stable.unwrap_or(largest_hz.min(optimum_hz))
     }
 }
 
