@@ -1,14 +1,11 @@
 //! New machine file: the text of the file in force with other numbers, or with a frame.
 //!
-//! The parser locates each number; only those characters, and a comment behind them, are replaced. So order, comments,
-//! indentation, line ends and every other number stay as they are.
+//! Only the numbers and the comments behind them are replaced. Order, other comments, indentation, line ends and every other
+//! number stay as they are.
 
-use core::ops::Range;
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml_edit::{Decor, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use self::change_comment::ChangeComment;
 pub use self::difference::{changed_margins, difference};
@@ -16,7 +13,6 @@ use self::estimate::array;
 pub use self::estimate::{Estimate, NewNumbers, NewValue};
 pub use self::frame::with_frame;
 use super::failure::CommandError;
-use hexad_machine::config::number;
 use hexad_machine::text::files::{FileError, is_standard, write_whole};
 
 mod change_comment;
@@ -74,12 +70,15 @@ impl CommandError for MachineFileError {}
 /// A number that equals its estimate but for digits that the deviation does not justify stays. A missing key is
 /// added at the end of its section, a missing section at the end of the file.
 pub fn edited(text: &str, values: &[NewValue]) -> Result<String, MachineFileError> {
-    let root = parsed(text)?;
-    let mut edits = Edits::new(text);
-    values.iter().try_for_each(|value| edits.add(root.get_ref(), value))?;
-    let edited = edits.apply();
-    parsed(&edited)?;
-    Ok(edited)
+    let mut document = parsed(text)?;
+    for new in values {
+        let is_finite = |estimate: &Estimate| estimate.value.is_finite() && estimate.deviation.is_finite();
+        if !new.value.estimates().iter().all(is_finite) {
+            return Err(MachineFileError::NotFinite { key: new.path.join(".") });
+        }
+        set(document.as_table_mut(), new.path, new, false)?;
+    }
+    written(text, &document)
 }
 
 /// Writes a new machine file durably, completely or not at all. A file that exists stays as it is, above all the one in
@@ -91,179 +90,128 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), MachineFileError> {
     Ok(write_whole(path, text.as_bytes())?)
 }
 
-fn parsed(text: &str) -> Result<Spanned<DeTable<'_>>, MachineFileError> {
-    DeTable::parse(text).map_err(|error| MachineFileError::Syntax { message: error.message().into() })
+fn parsed(text: &str) -> Result<DocumentMut, MachineFileError> {
+    text.parse()
+        .map_err(|error: toml_edit::TomlError| MachineFileError::Syntax { message: error.message().into() })
 }
 
-/// Edits of a text.
-struct Edits<'t> {
-    text: &'t str,
-    line_end: &'static str,
-    replacements: Vec<(Range<usize>, String)>,
-    /// Comments by the end of the value in front of them.
-    comments: BTreeMap<usize, ChangeComment>,
-    /// New lines by the end of the line above them.
-    lines: Vec<(usize, String)>,
-    /// Lines of new sections by header.
-    sections: BTreeMap<String, String>,
-}
-
-/// Table in which a new value belongs.
-struct Place<'r> {
-    table: &'r DeTable<'r>,
-    /// Span of the table: of its header, of the whole table if it is inline, of a key if it has no header.
-    span: Range<usize>,
-    /// If it is inline, or within an inline table: the end of the outermost one, and how many keys lead to that.
-    inline: Option<(usize, usize)>,
-}
-
-impl<'t> Edits<'t> {
-    fn new(text: &'t str) -> Self {
-        let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
-        let (replacements, lines) = Default::default();
-        Self { text, line_end, replacements, lines, comments: BTreeMap::new(), sections: BTreeMap::new() }
+/// The document with the line ends of the text.
+fn written(text: &str, document: &DocumentMut) -> Result<String, MachineFileError> {
+    let mut written = document.to_string();
+    parsed(&written)?;
+    if !text.ends_with('\n') && written.ends_with('\n') {
+        written.pop();
     }
+    Ok(if text.contains("\r\n") { written.replace('\n', "\r\n") } else { written })
+}
 
-    fn add(&mut self, root: &DeTable, new: &NewValue) -> Result<(), MachineFileError> {
-        let key = || new.path.join(".");
-        let is_finite = |estimate: &Estimate| estimate.value.is_finite() && estimate.deviation.is_finite();
-        if !new.value.estimates().iter().all(is_finite) {
-            return Err(MachineFileError::NotFinite { key: key() });
-        }
-        let mut place = Place { table: root, span: 0..0, inline: None };
-        for (depth, name) in new.path.iter().enumerate() {
-            let Some(value) = place.table.get(*name) else {
-                self.insert(&place, new, depth);
-                return Ok(());
-            };
-            let DeValue::Table(table) = value.get_ref() else {
-                let is_last = depth + 1 == new.path.len();
-                let expected = if is_last { NUMERIC } else { "a table" };
-                let replaced = if is_last { self.replace(&place, new, value) } else { None };
-                let found = value.get_ref().type_str();
-                return replaced.ok_or_else(|| MachineFileError::Type { key: key(), found, expected });
-            };
-            let inline = self.is_inline(value).then(|| (value.span().end, depth + 1));
-            place = Place { table, span: value.span(), inline: place.inline.or(inline) };
-        }
-        Err(MachineFileError::Type { key: key(), found: "table", expected: NUMERIC })
+/// What was changed: the old text of a value, `None` for a new one.
+type Changed = Option<Option<String>>;
+
+/// Sets the value at the end of a path below a table, with the comment behind the outermost value.
+fn set(
+    table: &mut dyn TableLike,
+    path: &[&str],
+    new: &NewValue,
+    is_inline: bool,
+) -> Result<Changed, MachineFileError> {
+    let Some((name, below)) = path.split_first() else { return Ok(None) };
+    let of_type = |found: &Item, expected| {
+        let (key, found) = (new.path.join("."), found.type_name());
+        MachineFileError::Type { key, found, expected }
+    };
+    let is_new = !table.contains_key(name);
+    if is_new {
+        insert(table, name, !below.is_empty(), new, is_inline);
     }
+    let Some(item) = table.get_mut(name) else { return Ok(None) };
+    let changed = match below {
+        [] if is_new => Some(None),
+        [] => replace(item, new).ok_or_else(|| of_type(item, NUMERIC))?,
+        _ => {
+            let (is_inline, of_value) = (item.is_inline_table(), of_type(item, "a table"));
+            set(item.as_table_like_mut().ok_or(of_value)?, below, new, is_inline)?
+        }
+    };
+    if let (Some(old), Some(value), false) = (&changed, item.as_value_mut(), is_inline) {
+        comment(value.decor_mut(), &below.join("."), old.clone(), new);
+    }
+    Ok(changed)
+}
 
-    /// Replaces the numbers of a value that differ from their estimates. Returns `None` if the value is not numeric.
-    fn replace(&mut self, place: &Place, new: &NewValue, value: &Spanned<DeValue>) -> Option<()> {
-        let items = match value.get_ref() {
-            DeValue::Array(items) => items.iter().collect(),
-            _ => vec![value],
+/// Adds a value, with the indentation of the key above, or a table.
+fn insert(table: &mut dyn TableLike, name: &str, is_table: bool, new: &NewValue, is_inline: bool) {
+    let above = table.iter().filter(|(_, item)| item.is_value()).last();
+    let decor = above.and_then(|(above, _)| table.key(above)?.leaf_decor().prefix()?.as_str());
+    let indentation = decor.and_then(|prefix| prefix.rsplit('\n').next()).map(String::from);
+    let item = match (is_table, is_inline) {
+        (true, true) => {
+            let mut dotted = InlineTable::new();
+            dotted.set_dotted(true);
+            Value::from(dotted).into()
+        }
+        (true, false) => Table::new().into(),
+        (false, _) => value_of(&new.value.toml()).into(),
+    };
+    table.insert(name, item);
+    if is_inline {
+        table.fmt();
+    } else if let (Some(mut key), false) = (table.key_mut(name), is_table) {
+        key.leaf_decor_mut().set_prefix(indentation.unwrap_or_default());
+    }
+}
+
+/// Replaces the numbers of a value that differ from their estimates. Returns `None` if the value is not numeric.
+fn replace(item: &mut Item, new: &NewValue) -> Option<Changed> {
+    let value = item.as_value_mut()?;
+    let (was_array, is_array) = (value.is_array(), matches!(new.value, NewNumbers::Array(_)));
+    let items: Vec<&Value> = value.as_array().map_or_else(|| vec![&*value], |items| items.iter().collect());
+    let numbers: Vec<f64> = items.iter().map(|item| number(item)).collect::<Option<_>>()?;
+    let texts = items.iter().map(|item| (*item).clone().decorated("", "").to_string());
+    let old = if was_array { array(texts) } else { texts.collect() };
+    let estimates = new.value.estimates();
+    let has_changed = if was_array == is_array && numbers.len() == estimates.len() {
+        let places: Vec<&mut Value> = match value {
+            Value::Array(items) => items.iter_mut().collect(),
+            one => vec![one],
         };
-        let numbers: Vec<f64> = items.iter().map(|item| number(item.get_ref())).collect::<Option<_>>()?;
-        let estimates = new.value.estimates();
-        let was_array = value.get_ref().is_array();
-        let is_array = matches!(new.value, NewNumbers::Array(_));
-        let texts = items.iter().map(|item| self.text.get(item.span()).unwrap_or_default().to_string());
-        let old = if was_array { array(texts) } else { texts.collect() };
-        let before = self.replacements.len();
-        if was_array == is_array && numbers.len() == estimates.len() {
-            let pairs = items.iter().zip(&numbers).zip(estimates);
-            let changed = pairs.filter(|((_, number), estimate)| !estimate.is_equal_to(**number));
-            self.replacements.extend(changed.map(|((item, _), estimate)| (item.span(), estimate.toml())));
-        } else if was_array == is_array
-            || !estimates.iter().all(|new| numbers.iter().all(|old| new.is_equal_to(*old)))
-        {
-            self.replacements.push((value.span(), new.value.toml()));
-        }
-        if self.replacements.len() > before {
-            let (end, depth) = place.inline.unwrap_or((value.span().end, new.path.len()));
-            self.comment(end, new, depth, Some(old));
-        }
-        Some(())
-    }
+        let pairs = places.into_iter().zip(numbers).zip(estimates);
+        let changed = pairs.filter(|((_, number), estimate)| !estimate.is_equal_to(*number));
+        changed.map(|((place, _), estimate)| exchange(place, &estimate.toml())).count() > 0
+    } else {
+        let is_equal = |new: &Estimate| numbers.iter().all(|old| new.is_equal_to(*old));
+        let has_changed = was_array == is_array || !estimates.iter().all(is_equal);
+        has_changed.then(|| exchange(value, &new.value.toml())).is_some()
+    };
+    Some(has_changed.then_some(Some(old)))
+}
 
-    /// Inserts a key that the table, `depth` keys below the top, does not have.
-    fn insert(&mut self, place: &Place, new: &NewValue, depth: usize) {
-        let names = new.path.get(depth..).unwrap_or_default();
-        let assignment = format!("{} = {}", names.join("."), new.value.toml());
-        let values = place.table.iter().filter(|(_, value)| !self.has_header(value));
-        let last = values.max_by_key(|(_, value)| value.span().end);
-        if let Some((end, depth)) = place.inline {
-            let (at, separator) =
-                last.map_or((place.span.start + 1, " "), |(_, value)| (value.span().end, ", "));
-            self.replacements.push((at..at, format!("{separator}{assignment}")));
-            self.comment(end, new, depth, None);
-            return;
-        }
-        let mut comment = ChangeComment::default();
-        comment.add("", None, new.value.deviations());
-        let line = |prefix: &str, assignment: &str| {
-            format!("{}{prefix}{assignment}{}", self.line_end, comment.after(""))
-        };
-        match (names, last) {
-            (&[_], Some((key, value))) => {
-                // Indentation, and the keys in front if they are dotted.
-                let above = self.text.get(..key.span().start).unwrap_or_default();
-                let prefix = above.rsplit('\n').next().unwrap_or_default();
-                self.lines.push((self.end_of_line(value.span().end), line(prefix, &assignment)));
-            }
-            (&[_], None) if self.starts_with(&place.span, '[') => {
-                self.lines.push((self.end_of_line(place.span.end), line("", &assignment)));
-            }
-            _ => {
-                let (name, header) = new.path.split_last().unwrap_or((&"", &[]));
-                let line = line("", &format!("{name} = {}", new.value.toml()));
-                *self.sections.entry(header.join(".")).or_default() += &line;
-            }
-        }
-    }
+/// Replaces a value, with what is around it as before.
+fn exchange(value: &mut Value, text: &str) {
+    let decor = value.decor().clone();
+    *value = value_of(text);
+    *value.decor_mut() = decor;
+}
 
-    fn comment(&mut self, end: usize, new: &NewValue, depth: usize, old: Option<String>) {
-        let key = new.path.get(depth..).unwrap_or_default().join(".");
-        self.comments.entry(end).or_default().add(&key, old, new.value.deviations());
-    }
+/// A value from the text of numbers, which is valid.
+fn value_of(text: &str) -> Value {
+    text.parse().unwrap_or_else(|_| f64::NAN.into())
+}
 
-    /// The edited text.
-    fn apply(mut self) -> String {
-        for (end, comment) in &self.comments {
-            let rest = *end..self.end_of_line(*end);
-            let changed = comment.after(self.text.get(rest.clone()).unwrap_or_default());
-            self.replacements.push((rest, changed));
-        }
-        self.replacements.extend(self.lines.into_iter().map(|(at, line)| (at..at, line)));
-        self.replacements.sort_by_key(|(range, _)| range.start);
-        let (mut edited, mut end) = (String::new(), 0);
-        for (range, replacement) in self.replacements {
-            edited += self.text.get(end..range.start).unwrap_or_default();
-            edited += &replacement;
-            end = range.end;
-        }
-        edited += self.text.get(end..).unwrap_or_default();
-        for (header, lines) in self.sections {
-            let ends_line = edited.ends_with('\n');
-            let [before, after] = if ends_line { ["", self.line_end] } else { [self.line_end, ""] };
-            edited += &format!("{before}{}[{header}]{lines}{after}", self.line_end);
-        }
-        edited
-    }
+fn number(value: &Value) -> Option<f64> {
+    value.as_float().or(value.as_integer().map(|x| x as f64))
+}
 
-    fn end_of_line(&self, from: usize) -> usize {
-        let rest = self.text.get(from..).unwrap_or_default();
-        from + rest.lines().next().map_or(0, str::len)
-    }
+/// Whether a machine file has a table at a path.
+pub fn has_table(text: &str, path: &[&str]) -> bool {
+    let document = parsed(text).unwrap_or_default();
+    path.iter().try_fold(document.as_item(), |item, key| item.get(key)).is_some_and(Item::is_table_like)
+}
 
-    fn starts_with(&self, span: &Range<usize>, first: char) -> bool {
-        self.text.get(span.clone()).is_some_and(|text| text.starts_with(first))
-    }
-
-    fn is_inline(&self, value: &Spanned<DeValue>) -> bool {
-        self.starts_with(&value.span(), '{')
-    }
-
-    /// Whether a value is a section, or an array of sections, rather than a value behind a key.
-    fn has_header(&self, value: &Spanned<DeValue>) -> bool {
-        match value.get_ref() {
-            DeValue::Table(_) => !self.is_inline(value),
-            DeValue::Array(items) => {
-                items.first().is_some_and(|item| item.span().start == value.span().start)
-            }
-            _ => false,
-        }
-    }
+fn comment(decor: &mut Decor, key: &str, old: Option<String>, new: &NewValue) {
+    let mut comment = ChangeComment::default();
+    comment.add(key, old, new.value.deviations());
+    let rest = decor.suffix().and_then(|suffix| suffix.as_str()).unwrap_or_default();
+    let changed = comment.after(rest);
+    decor.set_suffix(changed);
 }

@@ -121,7 +121,7 @@ impl IdentifyArguments {
             }
         }
         let Some(path) = &self.output else { return Ok(()) };
-        let new = edited(&text, &new_values(&found, !self.payload.is_empty(), &delay))?;
+        let new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
         let changed = Config::parse(&new, "the new machine file")?;
         write_new(path, &new)?;
         if !self.json {

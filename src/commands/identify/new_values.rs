@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::report::Delay;
-use crate::commands::machine_file::{Estimate, NewNumbers, NewValue};
+use crate::commands::machine_file::{Estimate, NewNumbers, NewValue, has_table};
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::inverse_dynamics;
 use hexad_core::model::fidelity::Gravity;
@@ -41,7 +41,7 @@ const PLATFORM: [(Path, Number); 7] = [
 ];
 const CENTER: Path = &["platform", "center_of_mass_m"];
 
-/// Transverse inertia of a link: its key, the key of its constant part if it varies, and the link.
+/// Transverse inertia of a link: its key, the key of its constant part where the file has a table, and the link.
 type Across = (Path, Path, fn(&Machine) -> &Link);
 const ACROSS: [Across; 2] = [
     (
@@ -64,8 +64,13 @@ const OF_LEGS: [(Path, OfLegs); 4] = [
     (&["actuator", "force_scale"], |machine| &machine.actuator.force_scale),
 ];
 
-/// All values of an identified machine. With `has_payload` the payload is a part of the platform.
-pub(super) fn new_values(found: &Identification, has_payload: bool, delay: &Delay) -> Vec<NewValue> {
+/// All values of an identified machine, for its file. With `has_payload` the payload is a part of the platform.
+pub(super) fn new_values(
+    text: &str,
+    found: &Identification,
+    has_payload: bool,
+    delay: &Delay,
+) -> Vec<NewValue> {
     let estimate = |of: &dyn Fn(&Machine, &Platform) -> f64| {
         let estimated = found.estimate(|machine, payload| {
             let none = Platform { mass: 0.0, ..payload.clone() };
@@ -87,10 +92,9 @@ pub(super) fn new_values(found: &Identification, has_payload: bool, delay: &Dela
     values.push(array(CENTER, 3, &|machine, payload, axis| {
         joined(machine, payload).center_of_mass.get(axis).copied().unwrap_or_default()
     }));
-    for (path, varying, link) in ACROSS {
-        let varies = link(&found.machine).transverse_inertia.quadratic != 0.0;
-        let constant = |machine: &Machine, _: &Platform| link(machine).transverse_inertia.constant;
-        values.push(one(if varies { varying } else { path }, &constant));
+    for (path, constant, link) in ACROSS {
+        let path = if has_table(text, path) { constant } else { path };
+        values.push(one(path, &|machine: &Machine, _: &Platform| link(machine).transverse_inertia.constant));
     }
     for (path, of) in OF_LEGS {
         values.push(array(path, LEGS, &|machine, _, leg| of(machine).get(leg).copied().unwrap_or_default()));

@@ -190,13 +190,13 @@ fn missing_keys_and_sections_are_added() {
     for (text, expected) in [
         (
             "[a]\n  x = 1 # own\n\n[c]",
-            "[a]\n  x = 1 # own\n  mass = 2.0 # new, +- 0.1\n\n[c]\n\n[a.b]\nxy = 3.0 # new",
+            "[a]\n  x = 1 # own\n  mass = 2.0 # new, +- 0.1\n\n[a.b]\nxy = 3.0 # new\n\n[c]",
         ),
         ("[a] # own\n[a.b]\nx = 1\n", "[a] # own\nmass = 2.0 # new, +- 0.1\n[a.b]\nx = 1\nxy = 3.0 # new\n"),
         ("[a]\nb.x = 1\ny = 1", "[a]\nb.x = 1\nb.xy = 3.0 # new\ny = 1\nmass = 2.0 # new, +- 0.1"),
         ("a = { x = 1 }", "a = { x = 1, mass = 2.0, b.xy = 3.0 } # mass new, +- 0.1; b.xy new"),
-        ("a = { b = {} }\n", "a = { b = { xy = 3.0}, mass = 2.0 } # mass new, +- 0.1; b.xy new\n"),
-        ("[a.b]\nxx = 1\n", "[a.b]\nxx = 1\nxy = 3.0 # new\n\n[a]\nmass = 2.0 # new, +- 0.1\n"),
+        ("a = { b = {} }\n", "a = { b = { xy = 3.0 }, mass = 2.0 } # mass new, +- 0.1; b.xy new\n"),
+        ("[a.b]\nxx = 1\n", "[a]\nmass = 2.0 # new, +- 0.1\n[a.b]\nxx = 1\nxy = 3.0 # new\n"),
         ("x = 1\n", "x = 1\n\n[a]\nmass = 2.0 # new, +- 0.1\n\n[a.b]\nxy = 3.0 # new\n"),
     ] {
         for line_end in ["\n", "\r\n"] {
@@ -212,7 +212,7 @@ fn missing_keys_and_sections_are_added() {
 #[test]
 fn values_that_cannot_be_written_are_rejected() {
     let refused = |text: &str, path, value| edited(text, &[one(path, value, 0.1)]).unwrap_err().to_string();
-    let found = "is of type array in the machine file, must be a table; ";
+    let found = "is of type array of tables in the machine file, must be a table; ";
     assert!(refused(REFERENCE, &["leg", "base_m"], 1.0).starts_with(&format!("leg.base_m {found}")));
     assert!(refused(REFERENCE, &["name"], 1.0).starts_with("name is of type string in the machine file, "));
     assert!(refused(REFERENCE, &["rod", "transverse_inertia_kg_m2"], 1.0).contains(" is of type table "));
