@@ -1,30 +1,23 @@
 //! Differences between two machine files, for a terminal.
 
+use similar::{ChangeTag, TextDiff};
+
 use crate::commands::check::CheckReport;
 use hexad_machine::config::Config;
 
 /// The lines that differ, each with its number: `-` for lines of the old text, `+` for lines of the new text.
 pub fn difference(old: &str, new: &str) -> String {
     let [old, new] = [old, new].map(|text| text.lines().collect::<Vec<_>>());
-    let (mut shown, mut i, mut j) = (String::new(), 0, 0);
-    while i < old.len() || j < new.len() {
-        let (removed, added) = lines_to_next_match(&old, &new, i, j);
-        for (sign, lines, first, count) in [('-', &old, i, removed), ('+', &new, j, added)] {
-            for (index, line) in lines.iter().enumerate().skip(first).take(count) {
-                shown += &format!("{sign} {:>4}  {line}\n", index + 1);
-            }
-        }
-        (i, j) = (i + removed + 1, j + added + 1);
-    }
-    shown
-}
-
-/// Fewest lines to skip in both texts, from `i` and `j` on, until a line of both or both ends match.
-fn lines_to_next_match(old: &[&str], new: &[&str], i: usize, j: usize) -> (usize, usize) {
-    let rest = (old.len().saturating_sub(i), new.len().saturating_sub(j));
-    let splits = |sum: usize| (sum.saturating_sub(rest.1)..=sum.min(rest.0)).map(move |a| (a, sum - a));
-    let is_match = |(a, b): &(usize, usize)| old.get(i + a) == new.get(j + b);
-    (0..=rest.0 + rest.1).flat_map(splits).find(is_match).unwrap_or(rest)
+    let compared = TextDiff::from_slices(&old, &new);
+    let lines = compared.iter_all_changes().filter_map(|change| {
+        let (sign, index) = match change.tag() {
+            ChangeTag::Delete => ('-', change.old_index()?),
+            ChangeTag::Insert => ('+', change.new_index()?),
+            ChangeTag::Equal => return None,
+        };
+        Some(format!("{sign} {:>4}  {}\n", index + 1, change.value()))
+    });
+    lines.collect()
 }
 
 /// The lines of `hexad check` that differ between two machine files, each as the old line, `->` and the new line below.
