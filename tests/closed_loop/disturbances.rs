@@ -7,8 +7,9 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
 use hexad::model::task::TaskState;
 
-use hexad_support::deployed;
+use hexad_support::edited::{deployed_table, set};
 use hexad_support::rig::{Rig, parameters};
+use hexad_support::{deployed, edited};
 
 fn compensating(is_compensating: bool) -> Config {
     let mut config = deployed("motion_base");
@@ -35,6 +36,38 @@ fn a_payload_of_a_fifth_leaves_nothing() {
     println!("without {without:e} m, with {with:e} m");
     assert!(without > 1e-4);
     assert!(with < 1e-3 * without, "{with} of {without}");
+}
+
+/// The first start of the guide for commissioning, with drives limited to little more than the weight.
+#[test]
+fn the_first_start_bears_a_platform_that_is_a_seventh_heavier_or_lighter() {
+    let guide = include_str!("../../docs/commissioning.md");
+    assert!(guide.contains("step 1 plus 30 %") && guide.contains("`feedback_scale = 4`"));
+    for (name, mass_ratio) in
+        ["motion_base", "fried2008", "tsai2000"].iter().flat_map(|name| [(name, 0.85), (name, 1.15)])
+    {
+        let Config { machine, .. } = deployed(name);
+        let home = TaskState::at_rest(machine.home);
+        let weight = InverseDynamics::new(&machine).forces::<Gravity>(&home.motion()).unwrap();
+        let mut table = deployed_table(name);
+        set(
+            &mut table,
+            "actuator",
+            "max_force_n",
+            1.3 * weight.iter().fold(0.0, |most: f64, force| most.max(force.abs())),
+        );
+        set(&mut table, "limits", "feedback_scale", 4.0);
+        let config = edited::config(&table);
+        let mut other = config.machine.clone();
+        other.platform.mass *= mass_ratio;
+        other.platform.inertia *= mass_ratio;
+        let mut rig = Rig::new(&config, &other);
+        rig.engage(&home);
+        for cycle in 0..2000 {
+            let output = rig.cycle(&rig.input(&home));
+            assert_eq!(output.state, State::Active, "{name} {mass_ratio} {cycle}: {:?}", output.diagnostic);
+        }
+    }
 }
 
 /// How far the platform shoots over when a load, a little too heavy for the drives, falls off.
