@@ -66,6 +66,8 @@ fn gains_limits_and_timeouts_are_taken_over_in_standby_and_not_under_control() {
             ("scale = 0.5", "scale = 0.1"),
             ("= 10.0", "= 8.0"),
             ("setpoint_ms = 400.0", "setpoint_ms = 300.0"),
+            ("mass_kg = 3.0", "mass_kg = 3.01"),
+            ("max_force_n = 500.0", "max_force_n = 500.0\ncoulomb_friction_n = 0.1"),
         ],
     );
     let words = "reload was refused, nothing has changed:\nnot possible in state active, in which the platform is under \
@@ -75,8 +77,9 @@ fn gains_limits_and_timeouts_are_taken_over_in_standby_and_not_under_control() {
     daemon.says("reload was refused, nothing has changed: not possible in state active");
     does(&machine, "stop", &[], &["standby"]);
     let stdout = ask(&machine, "reload", &[]).succeeds();
-    let changes = "on: timeouts.setpoint_ms: 400.0 -> 300.0; limits.condition: 90.0 -> 80.0; limits.scale: 0.5 -> 0.1; \
-                   control.position_bandwidth_hz: 10.0 -> 8.0\n";
+    let changes = "on: platform.mass_kg: 3.0 -> 3.01; timeouts.setpoint_ms: 400.0 -> 300.0; limits.condition: 90.0 -> 80.0; \
+                   limits.scale: 0.5 -> 0.1; control.position_bandwidth_hz: 10.0 -> 8.0; \
+                   actuator.coulomb_friction_n: default -> 0.1\n";
     let file = format!("{}, from cycle ", machine.file.display());
     assert!(stdout.starts_with(&file) && stdout.ends_with(changes), "{stdout}");
     daemon.says(&format!("request: reload user={} process=", own_name()));

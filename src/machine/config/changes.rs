@@ -9,11 +9,30 @@ use toml::de::{DeTable, DeValue};
 use super::bound::number;
 use crate::text::excerpt::excerpt;
 
-/// Sections that a running daemon can reload. All others need a restart: geometry, masses and actuators
-/// belong to the machine, `realtime` to the threads, `operator` to the control socket, and the name to the
-/// topics.
-const RELOADABLE: [&str; 8] =
-    ["control", "drive", "envelope", "in_position", "limits", "measured", "setpoint", "timeouts"];
+/// Sections that a running daemon can reload, and keys of `[actuator]`: how the platform is controlled, and what `hexad identify`
+/// finds. All others need a restart: joints, stroke and force of the drives belong to the machine, `realtime` to the threads,
+/// `operator` to the control socket, and the name to the topics.
+const RELOADABLE: [&str; 11] = [
+    "control",
+    "cylinder",
+    "drive",
+    "envelope",
+    "in_position",
+    "limits",
+    "measured",
+    "platform",
+    "rod",
+    "setpoint",
+    "timeouts",
+];
+const RELOADABLE_OF_ACTUATOR: [&str; 6] = [
+    "actuator.coulomb_friction_n",
+    "actuator.force_scale",
+    "actuator.friction_uncertainty_n",
+    "actuator.load_friction",
+    "actuator.reflected_mass_kg",
+    "actuator.viscous_friction_n_s_m",
+];
 
 /// Sections that the daemon does not read: commands read them from the file each time.
 const FOREIGN: [&str; 2] = ["frame", "plant"];
@@ -32,7 +51,7 @@ pub struct Change {
 impl Change {
     /// Whether a running daemon can reload it.
     pub fn is_reloadable(&self) -> bool {
-        RELOADABLE.contains(&self.section())
+        RELOADABLE.contains(&self.section()) || RELOADABLE_OF_ACTUATOR.contains(&self.key.as_str())
     }
 
     fn section(&self) -> &str {
@@ -148,5 +167,8 @@ mod tests {
         );
         let reloadable: Vec<_> = changes(old, new).iter().map(Change::is_reloadable).collect();
         assert_eq!(reloadable, [false, true, true, true, false, false]);
+        let [old, new] = ["[platform]\nmass_kg = 1\n[actuator]\nload_friction = 0\nmax_force_n = 5\n", ""];
+        let reloadable: Vec<_> = changes(old, new).iter().map(Change::is_reloadable).collect();
+        assert_eq!(reloadable, [true, true, false]);
     }
 }
