@@ -1,7 +1,9 @@
 //! `estop`, `off` and `stop` reach the daemon whatever else happens to its shared memory, its socket and its log.
 
+use std::any::Any;
 use std::fs;
 use std::io::{Read, Write};
+use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::Stdio;
@@ -9,6 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+
+use nix::pty::{OpenptyResult, openpty};
+use nix::sys::termios::{FlowArg, tcflow};
 
 use hexad::messages::claim::running_daemons;
 use hexad::messages::{Bus, CommandMessage, Publisher, StatusMessage, Subscriber};
@@ -157,11 +162,36 @@ fn a_held_daemon_is_not_called_stopped_and_stops_when_it_goes_on() {
     plant.stops();
 }
 
-/// Nobody reads standard error, and no thread waits for it: requests are answered, cycles recorded, and SIGTERM ends the daemon.
 #[test]
 #[apply(beside_others)]
 fn with_a_log_that_nobody_reads() {
-    let machine = Machine::patient("unread");
+    with_a_blocked_log("pipe", || {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        (Box::new(reader), writer.into())
+    });
+}
+
+/// Ctrl-S on its terminal, and a journal that is stopped.
+#[test]
+#[ignore = "second tier: takes long"]
+#[apply(beside_others)]
+fn with_a_stopped_terminal_and_a_stopped_journal() {
+    with_a_blocked_log("terminal", || {
+        let OpenptyResult { master, slave } = openpty(None, None).expect("a terminal");
+        tcflow(&slave, FlowArg::TCOOFF).expect("to stop it");
+        (Box::new(master), slave.into())
+    });
+    with_a_blocked_log("journal", || {
+        let (reader, writer) = UnixStream::pair().expect("a stream, as of the journal");
+        (Box::new(reader), OwnedFd::from(writer).into())
+    });
+}
+
+/// Nobody reads standard error, and no thread waits for it: requests are answered, cycles recorded, and SIGTERM ends the daemon.
+/// `log`: its two ends.
+fn with_a_blocked_log(name: &str, log: fn() -> (Box<dyn Any>, Stdio)) {
+    let (_reader, stderr) = log();
+    let machine = Machine::patient(name);
     let folder = machine.path("state");
     fs::create_dir(&folder).expect("a folder");
     let run = || {
@@ -170,7 +200,7 @@ fn with_a_log_that_nobody_reads() {
         command.arg("--report").arg(machine.path("report.json"));
         command
     };
-    let mut daemon = run().stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("a daemon");
+    let mut daemon = run().stderr(stderr).stdout(Stdio::null()).spawn().expect("a daemon");
     let plant = start_plant(&machine);
     let _peer = peer::start(&machine);
     let began = Instant::now();
@@ -183,7 +213,7 @@ fn with_a_log_that_nobody_reads() {
     let mut stream = UnixStream::connect(path).expect("a connection");
     stream.set_write_timeout(Some(Duration::from_secs(5))).expect("a limit");
     stream.set_read_timeout(Some(Duration::from_secs(5))).expect("a limit");
-    // Several times what a pipe holds.
+    // Several times what any of them holds.
     let line = b"{\"version\": 1, \"request\": \"engage\"}\n";
     let mut answer = [0; 4096];
     let answered = (0..5000)
