@@ -52,6 +52,11 @@ pub struct RequestLine {
     /// Longest time to wait \[s\].
     #[serde(default = "default_within_s")]
     pub within_s: f64,
+    /// Instant of the cycle before which a request to the controller is not obeyed, in simulated time \[ns\]; `None` for the next
+    /// cycle. A line with result `waiting` then says that it is posted: the setpoint of that cycle may be published. A stop does not
+    /// wait for its cycle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cycle_ns: Option<u64>,
     /// Length of a recording \[s\]; `None` for all cycles that are kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,
