@@ -225,14 +225,15 @@ fn requested_by_cycle() -> Vec<([u64; 3], Vec<u8>)> {
     posts(&mut operator, "engage", ENGAGED_IN);
     for cycle in 0..STOPPED_IN + 5 {
         let time_ns = cycle * PERIOD_NS;
-        let (length_m, _) = hardware.measure();
+        let (length_m, length_rate_m_s) = hardware.measure();
+        let message = MeasuredMessage { length_m, length_rate_m_s, rates_valid: 1, ..Default::default() };
         // No stop waits, so it is sent for its cycle, before the setpoint.
         if cycle == STOPPED_IN {
             posts(&mut operator, "estop", STOPPED_IN);
         }
         let began = Instant::now();
         let force = loop {
-            measured.publish(time_ns, MeasuredMessage { length_m, ..Default::default() }).expect("to send");
+            measured.publish(time_ns, message).expect("to send");
             setpoints.publish(time_ns, setpoint).expect("to send");
             sleep(Duration::from_millis(1));
             if let Some(force) = forces.receive_latest() {
