@@ -18,7 +18,7 @@ use hexad_core::control::signals::state::Request;
 const FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
 
 /// Longest wait for a cycle in simulated time: a day, as a participant may be held.
-const CYCLE_LIMIT: Duration = Duration::from_hours(24);
+const CYCLE_LIMIT: Duration = Duration::from_secs(86_400);
 
 /// Longest wait of a patient request for a daemon that is about to start.
 const DAEMON_START_LIMIT: Duration = Duration::from_secs(2);
