@@ -4,11 +4,11 @@ use core::sync::atomic::AtomicBool;
 
 use heapless::spsc::Producer;
 use hexad_client::messages::CycleMessage;
-use hexad_client::operator::protocol::is_stop;
+use hexad_client::operator::protocol::{MAX_REQUEST_AGE_NS, is_stop};
 use hexad_client::realtime::clock::Clock;
 use hexad_client::realtime::cyclic::{self, CyclicTask, LoopReport, Release, Timing};
 use hexad_client::realtime::exchange;
-use hexad_client::realtime::request_word::{self, MAX_REQUEST_AGE_NS};
+use hexad_client::realtime::request_word;
 use hexad_core::control::controller::Output;
 use hexad_core::control::signals::inputs::Input;
 use hexad_core::control::signals::state::{MessageId, OperatorRequest, Request, State};

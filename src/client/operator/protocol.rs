@@ -15,6 +15,10 @@ pub fn is_stop(request: Request) -> bool {
 /// Version of the protocol. It is raised only if an older client would misinterpret it.
 pub const VERSION: u32 = 1;
 
+/// Largest age of a request that may begin control \[ns\]. The sender of an older one has long stopped
+/// waiting.
+pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
+
 /// Longest waiting time if the request gives none \[s\].
 const DEFAULT_WITHIN_S: f64 = 30.0;
 

@@ -7,11 +7,10 @@ use std::time::{Duration, Instant};
 use super::connection::{Attempt, Connection};
 use super::endpoint::{Endpoint, endpoints};
 use super::exchange::converse;
-use super::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use super::protocol::{AnswerLine, MAX_REQUEST_AGE_NS, RequestLine, RequestResult, STOPPED};
 use super::ride::{RideOrder, RidePhase};
 use super::status_report::StopNumber;
 use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
-use crate::realtime::request_word::MAX_REQUEST_AGE_NS;
 use hexad_core::control::signals::state::Request;
 
 /// Longest wait for the first line of the daemon: longer than the daemon waits for its loop.

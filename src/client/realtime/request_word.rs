@@ -19,10 +19,6 @@ const TIME_MASK: u64 = (1 << TIME_BITS) - 1;
 const NUMBER_MASK: u64 = (1 << NUMBER_BITS) - 1;
 const CYCLE_BIT: u64 = 1 << (NUMBER_SHIFT + NUMBER_BITS);
 
-/// Largest age of a request that may begin control \[ns\]. The sender of an older one has long stopped
-/// waiting.
-pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
-
 /// Word that requests are posted to and the real-time thread loads.
 #[derive(Debug, Default)]
 pub struct RequestWord {

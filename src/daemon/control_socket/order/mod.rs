@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use crate::control_socket::answer::answer_line;
 use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
-use hexad_client::operator::protocol::{AnswerLine, RequestResult, STOPPED, is_stop};
-use hexad_client::realtime::request_word::{MAX_REQUEST_AGE_NS, RequestWord};
+use hexad_client::operator::protocol::{AnswerLine, MAX_REQUEST_AGE_NS, RequestResult, STOPPED, is_stop};
+use hexad_client::realtime::request_word::RequestWord;
 use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::state::{Request, State};
 
