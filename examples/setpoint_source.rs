@@ -6,18 +6,22 @@
 //! smooth motion: if one asks for more than the limits and the machine allow, the daemon comes to rest.
 
 use std::env;
-use std::thread::sleep;
+use std::thread::{sleep, spawn};
 use std::time::Duration;
 
 use hexad_client::messages::clock::monotonic_ns;
-use hexad_client::messages::{Bus, CommandMessage, PortError, SetpointMessage, StatusMessage};
-use hexad_core::control::signals::diagnostic::DiagnosticCode;
+use hexad_client::messages::{Bus, PortError, SetpointMessage, StatusMessage};
+use hexad_client::operator::Order;
+use hexad_client::operator::requests::carry_out;
 use hexad_core::control::signals::state::{Request, State};
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::minimum_jerk::{straight_move, window};
 use nalgebra::Vector6;
 
 const PERIOD: Duration = Duration::from_millis(1);
+
+/// Longest wait for control.
+const PATIENCE: Duration = Duration::from_secs(15);
 
 /// Duration of the motion, and of its way up and its way down \[s\].
 const DURATION_S: f64 = 6.0;
@@ -29,8 +33,14 @@ fn main() -> Result<(), PortError> {
     let height_mm = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let bus = Bus::join(&machine)?;
     let mut statuses = bus.subscriber::<StatusMessage>(8)?;
-    let mut commands = bus.publisher::<CommandMessage>()?;
     let mut setpoints = bus.publisher::<SetpointMessage>()?;
+    // Takes control as soon as the setpoints hold the pose of the platform. It waits, so it has a thread of its own.
+    spawn(move || {
+        let order = Order { is_patient: true, ..Order::new(Request::Engage, PATIENCE) };
+        if let Err(error) = carry_out(&machine, &order, &|| false, |reason| println!("waiting: {reason}")) {
+            println!("{error}");
+        }
+    });
     let (mut start, mut began_ns) = (None, None);
     loop {
         sleep(PERIOD);
@@ -44,9 +54,7 @@ fn main() -> Result<(), PortError> {
                 }
                 _ => {}
             }
-            if began_ns.is_none() && status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
-                commands.publish(now_ns, Request::Engage.into())?;
-            } else if began_ns.is_some() && !state.has_control() {
+            if began_ns.is_some() && !state.has_control() {
                 println!("control ended: {}", state.name());
                 return Ok(());
             }

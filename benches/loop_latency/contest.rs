@@ -3,13 +3,12 @@
 use std::fs;
 use std::process::Command;
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use hexad::commands::in_step::Operator;
-use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::state::{Request, State};
+use hexad::control::signals::state::Request;
 use hexad::daemon::report::Report;
-use hexad::messages::Bus;
+use hexad::operator::Order;
+use hexad::operator::requests::{carry_out, status};
 
 use super::Failure;
 use super::distribution::Distribution;
@@ -57,54 +56,26 @@ pub const HISTOGRAM_NS: u64 = 1_000_000;
 
 /// The daemon has to be in control within this time, or something is wrong.
 const START: Duration = Duration::from_secs(10);
-const LOOK: Duration = Duration::from_millis(5);
 
-/// Who hears the daemons' words about their state, and engages them.
-pub struct Watch(Vec<Operator>);
-
-impl Watch {
-    pub fn new(machines: usize) -> Result<Self, Failure> {
-        let operator = |number| Ok(Operator::new(&Bus::join(&Rig::machine_name(number))?)?);
-        (0..machines).map(operator).collect::<Result<_, Failure>>().map(Self)
-    }
-
-    /// Engages every daemon and waits until it is in control. Returns how many cycles each had run by then.
-    pub fn until_active(&mut self, daemons: &mut [Process]) -> Result<Vec<u64>, Failure> {
-        let begin = Instant::now();
-        let mut cycles = vec![];
-        for (number, operator) in self.0.iter_mut().enumerate() {
-            let mut why = "says nothing";
-            loop {
-                if let Some(status) = operator.status() {
-                    if status.state == State::Active as u32 {
-                        cycles.push(status.counters.cycles);
-                        break;
-                    }
-                    let cause = DiagnosticCode::from_number(status.diagnostic.code).unwrap_or_default();
-                    why = cause.name();
-                    if cause == DiagnosticCode::ReadyToEngage {
-                        operator.send(Request::Engage)?;
-                    }
-                }
-                for daemon in daemons.iter_mut() {
-                    daemon.must_run()?;
-                }
-                if begin.elapsed() > START {
-                    return Err(format!("daemon {number} is not in control after {START:?}: {why}").into());
-                }
-                sleep(LOOK);
-            }
-        }
-        Ok(cycles)
-    }
+/// Engages every daemon and waits until it is in control. Returns how many cycles each had run by then.
+pub fn until_active(daemons: &mut [Process]) -> Result<Vec<u64>, Failure> {
+    let order = Order { is_patient: true, ..Order::new(Request::Engage, START) };
+    let engage = |(number, daemon): (usize, &mut Process)| {
+        let machine = Rig::machine_name(number);
+        let engaged = carry_out(&machine, &order, &|| false, |_| ());
+        daemon.must_run()?;
+        engaged?;
+        Ok(status(&machine)?.status.map_or(0, |status| status.timing.cycles))
+    };
+    daemons.iter_mut().enumerate().map(engage).collect()
 }
 
 /// Runs the contestant of a row for so long.
-pub fn round(rig: &Rig, watch: &mut Watch, row: &Row, seconds: f64) -> Result<Round, Failure> {
+pub fn round(rig: &Rig, row: &Row, seconds: f64) -> Result<Round, Failure> {
     let before_ms = steal_ms(rig.processors.contestant);
     let mut round = match row.contestant {
         Contestant::Cyclictest => cyclictest(rig, row.rate_hz, seconds)?,
-        Contestant::Hexad(release) => hexad(rig, watch, release, row, seconds)?,
+        Contestant::Hexad(release) => hexad(rig, release, row, seconds)?,
     };
     round.steal_ms = steal_ms(rig.processors.contestant) - before_ms;
     Ok(round)
@@ -145,9 +116,9 @@ fn read_json(text: &str) -> Option<Distribution> {
     Some(wakeup)
 }
 
-fn hexad(rig: &Rig, watch: &mut Watch, release: Release, row: &Row, seconds: f64) -> Result<Round, Failure> {
+fn hexad(rig: &Rig, release: Release, row: &Row, seconds: f64) -> Result<Round, Failure> {
     let mut daemons = [start_daemon(rig, 0, row.rate_hz, release)?];
-    watch.until_active(&mut daemons)?;
+    until_active(&mut daemons)?;
     // It leaves the processor that it polls on no time for the start of a daemon.
     let subscriber = row.seen.then(|| Subscriber::start(rig)).transpose()?;
     sleep(Duration::from_secs_f64(seconds));

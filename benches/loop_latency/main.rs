@@ -48,7 +48,7 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use contest::{Contestant, Watch};
+use contest::Contestant;
 use distribution::Distribution;
 use driver::Driver;
 use load::Load;
@@ -143,12 +143,11 @@ fn measure(rig: &Rig, plan: Plan, omissions: &mut Omissions) -> Result<Measured,
         let why = format!("no {}; install it with: apt-get install {}", tool.name(), tool.package());
         omissions.lacking(tool.part(), why);
     }
-    let mut watch = Watch::new(1)?;
     let mut rows = rows(plan, &missing);
     let style = ProgressStyle::with_template("{bar:40} {pos} of {len} rounds, {eta} left")?;
     let bar = ProgressBar::new((plan.rounds * rows.len()) as u64).with_style(style);
     for round in 0..plan.rounds {
-        take_all(rig, &mut watch, &mut rows, round, plan.seconds, &bar, omissions);
+        take_all(rig, &mut rows, round, plan.seconds, &bar, omissions);
     }
     bar.finish_and_clear();
     rows.retain(|row| !row.rounds.is_empty());
@@ -157,7 +156,7 @@ fn measure(rig: &Rig, plan: Plan, omissions: &mut Omissions) -> Result<Measured,
     let steps = omissions.attempt("steps", "Controller::step", fleet::steps(rig)).unwrap_or_default();
     let mut calls = vec![];
     if !missing.contains(&Tool::Strace) {
-        let counted = syscalls::of_the_loop(rig, &mut watch, Release::Hybrid);
+        let counted = syscalls::of_the_loop(rig, Release::Hybrid);
         calls = omissions.attempt("system calls", Tool::Strace.part(), counted).unwrap_or_default();
     }
     let sizes = sizes(rig, plan.sizes, &spinner, omissions);
@@ -192,7 +191,6 @@ fn rows(plan: Plan, missing: &[Tool]) -> Vec<Row> {
 /// One round of each row; within a group another one begins each time.
 fn take_all(
     rig: &Rig,
-    watch: &mut Watch,
     rows: &mut [Row],
     round: usize,
     seconds: f64,
@@ -207,7 +205,7 @@ fn take_all(
         let turn = round % group.len();
         group.rotate_left(turn);
         for row in &mut *group {
-            let taken = contest::round(rig, watch, row, seconds);
+            let taken = contest::round(rig, row, seconds);
             let what = format!("{}, round {}", row.name(), round + 1);
             row.rounds.extend(omissions.attempt(row.contestant.name(), what, taken));
             bar.inc(1);

@@ -12,7 +12,7 @@ use std::time::Duration;
 use hexad::output::charts::LineStyle;
 use serde::Deserialize;
 
-use super::contest::{Watch, read_daemon, start_daemon};
+use super::contest::{read_daemon, start_daemon, until_active};
 use super::distribution::{Distribution, us};
 use super::driver::Driver;
 use super::fleet;
@@ -140,13 +140,12 @@ fn measure(
 
 /// So many daemons at once.
 fn daemons(rig: &Rig, rate_hz: u32, count: usize, seconds: f64) -> Result<Trial, Failure> {
-    let mut watch = Watch::new(count)?;
     let _driver = Driver::start(rig, count, rate_hz)?;
     let mut daemons: Vec<Process> = vec![];
     for number in 0..count {
         daemons.push(start_daemon(rig, number, rate_hz, Release::Sleep)?);
     }
-    let begun = watch.until_active(&mut daemons);
+    let begun = until_active(&mut daemons);
     if begun.is_ok() {
         sleep(Duration::from_secs_f64(seconds));
     }

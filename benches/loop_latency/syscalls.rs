@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use super::Failure;
-use super::contest::{Watch, start_daemon};
+use super::contest::{start_daemon, until_active};
 use super::driver::Driver;
 use super::rig::{Process, Release, Rig};
 
@@ -18,10 +18,10 @@ const TRACED: Duration = Duration::from_secs(1);
 const THREAD: &str = "hexad-rt";
 
 /// Names and counts, the most frequent first.
-pub fn of_the_loop(rig: &Rig, watch: &mut Watch, release: Release) -> Result<Vec<(String, u64)>, Failure> {
+pub fn of_the_loop(rig: &Rig, release: Release) -> Result<Vec<(String, u64)>, Failure> {
     let _driver = Driver::start(rig, 1, RATE_HZ)?;
     let mut daemons = [start_daemon(rig, 0, RATE_HZ, release)?];
-    watch.until_active(&mut daemons)?;
+    until_active(&mut daemons)?;
     let [mut daemon] = daemons;
     let thread = thread_of(daemon.id())?;
     let counts = rig.path("strace.txt");

@@ -8,6 +8,7 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include <hexad.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -50,6 +51,14 @@ static struct hexad_setpoint setpoint_at(const double start[6], double t)
     return setpoint;
 }
 
+/* Takes control as soon as the setpoints hold the pose of the platform. It waits, so it has a thread of its own. */
+static void *engage(void *machine)
+{
+    if (hexad_request((const char *)machine, HEXAD_REQUEST_ENGAGE, true, PATIENCE_S) != HEXAD_OK)
+        fprintf(stderr, "setpoint_source: %s\n", hexad_last_error());
+    return NULL;
+}
+
 /* Returns the exit code. */
 static int play(struct hexad_client *client)
 {
@@ -88,8 +97,6 @@ static int play(struct hexad_client *client)
             fprintf(stderr, "setpoint_source: %s\n", hexad_last_error());
             return 1;
         }
-        if (!has_control && status.diagnostic.code == HEXAD_DIAGNOSTIC_READY_TO_ENGAGE)
-            hexad_publish_request(client, now_ns, HEXAD_REQUEST_ENGAGE);
     }
     printf("done\n");
     return 0;
@@ -98,11 +105,18 @@ static int play(struct hexad_client *client)
 int main(int count, char **arguments)
 {
     int code;
-    struct hexad_client *client = hexad_open(count > 1 ? arguments[1] : "fried2008", HEXAD_SOURCE);
+    char standard[] = "fried2008", *machine = count > 1 ? arguments[1] : standard;
+    pthread_t thread;
+    struct hexad_client *client = hexad_open(machine, HEXAD_SOURCE);
     if (client == NULL) {
         fprintf(stderr, "setpoint_source: %s\n", hexad_last_error());
         return 1;
     }
+    if (pthread_create(&thread, NULL, engage, machine) != 0) {
+        fprintf(stderr, "setpoint_source: no thread\n");
+        return 1;
+    }
+    pthread_detach(thread);
     code = play(client);
     hexad_close(client);
     return code;

@@ -59,7 +59,6 @@ mod frame_options;
 mod goto;
 mod hold;
 mod identify;
-pub mod in_step;
 pub mod inverse_dynamics;
 mod jog;
 mod machine_file;

@@ -3,7 +3,8 @@
 use core::sync::atomic::AtomicBool;
 
 use heapless::spsc::Producer;
-use hexad_client::messages::{CycleMessage, MAX_REQUEST_AGE_NS};
+use hexad_client::messages::CycleMessage;
+use hexad_client::operator::protocol::{MAX_REQUEST_AGE_NS, is_stop};
 use hexad_client::realtime::clock::Clock;
 use hexad_client::realtime::cyclic::{self, CyclicTask, LoopReport, Release, Timing};
 use hexad_client::realtime::exchange;
@@ -56,71 +57,33 @@ pub fn run(
     cyclic::run(clock, timing, ControllerTask(step), last, side, records, stop)
 }
 
-/// Epoch of a request from the control socket or a signal; no publisher has it. The sequence of the request
-/// is the request word.
+/// Epoch of every request; its sequence is the request word.
 pub const WORD_EPOCH: u64 = u64::MAX;
 
-/// Intake of requests: from the request word or from the command topic, each once.
+/// Intake of requests from the request word, each once.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RequestIntake {
     /// The last word processed.
     word: u64,
-    /// The last message of the command topic processed.
-    message: MessageId,
-    /// Longest pause between two cycles after which a request of the topic may begin control \[ns\]. After a
-    /// longer one, the request may be from before the pause. 0: no bound, in simulated time.
-    longest_cycle_gap_ns: u64,
-    /// Wake-up of the last cycle \[ns\].
-    woke_ns: u64,
 }
 
 impl RequestIntake {
-    /// Intake of a real-time thread, in real or simulated time.
-    pub fn new(is_simulated: bool) -> Self {
-        let longest_cycle_gap_ns = if is_simulated { 0 } else { MAX_REQUEST_AGE_NS };
-        Self { longest_cycle_gap_ns, ..Self::default() }
-    }
-
-    /// The request of a cycle that wakes at `now_ns`. Of two new requests, the one of higher precedence is
-    /// returned; of two equal ones, the word. The other is lost if it may begin control or comes from the
-    /// topic. A stop in the word is returned in the next cycle.
+    /// The request of a cycle that wakes at `woke_ns` and computes for `release_ns`. One that names a later cycle is left until then,
+    /// but no stop waits. One that may begin control and is too old is lost.
     #[inline(never)]
-    pub fn next(
-        &mut self,
-        from_topic: Option<OperatorRequest>,
-        word: u64,
-        now_ns: u64,
-    ) -> Option<OperatorRequest> {
-        let from_topic = from_topic.filter(|request| request.message != self.message);
-        if let Some(request) = &from_topic {
-            self.message = request.message;
+    pub fn next(&mut self, word: u64, woke_ns: u64, release_ns: u64) -> Option<OperatorRequest> {
+        let request = Request::from_number(request_word::number(word)).filter(|_| word != self.word)?;
+        let cycle_ns = request_word::cycle_ns(word);
+        if cycle_ns.is_some_and(|cycle_ns| cycle_ns > release_ns) && !is_stop(request) {
+            return None;
         }
-        let pause_ns = now_ns.saturating_sub(core::mem::replace(&mut self.woke_ns, now_ns));
-        let was_held = self.longest_cycle_gap_ns > 0 && pause_ns > self.longest_cycle_gap_ns;
-        let from_topic = from_topic.filter(|topic| !(was_held && topic.request.can_begin_control()));
-        let from_word = if word == self.word { None } else { of_word(word, now_ns) };
-        match (from_topic, from_word) {
-            (Some(topic), Some(new)) if topic.request > new.request => {
-                if new.request.can_begin_control() {
-                    self.word = word;
-                }
-                Some(topic)
-            }
-            (topic, new) => {
-                self.word = word;
-                new.or(topic)
-            }
-        }
+        self.word = word;
+        let now_ns = if cycle_ns.is_some() { release_ns } else { woke_ns };
+        let is_too_old = now_ns.saturating_sub(request_word::time_ns(word)) > MAX_REQUEST_AGE_NS;
+        let is_lost = request.can_begin_control() && is_too_old;
+        let message = MessageId { epoch: WORD_EPOCH, sequence: word };
+        (!is_lost).then_some(OperatorRequest { request, message })
     }
-}
-
-/// The request of a word; `None` if there is none, or if it may begin control and is too old.
-pub fn of_word(word: u64, now_ns: u64) -> Option<OperatorRequest> {
-    let request = Request::from_number(request_word::number(word))?;
-    let is_too_old = now_ns.saturating_sub(request_word::time_ns(word)) > MAX_REQUEST_AGE_NS;
-    let is_lost = request.can_begin_control() && is_too_old;
-    (!is_lost)
-        .then_some(OperatorRequest { request, message: MessageId { epoch: WORD_EPOCH, sequence: word } })
 }
 
 /// Message of a cycle, as in a recording.
@@ -147,71 +110,40 @@ mod tests {
     use hexad_client::realtime::request_word::RequestWord;
 
     const NOW_NS: u64 = 5_000_000_000;
+    const CYCLE_NS: u64 = 2_000_000;
 
-    fn word(request: Request, age_ns: u64) -> u64 {
-        RequestWord::default().post(request as u32, NOW_NS - age_ns).unwrap()
-    }
-
-    fn topic(request: Request, sequence: u64) -> Option<OperatorRequest> {
-        Some(OperatorRequest { request, message: MessageId { epoch: 7, sequence } })
-    }
-
-    fn chosen(intake: &mut RequestIntake, from_topic: Option<OperatorRequest>, word: u64) -> Option<Request> {
-        intake.next(from_topic, word, NOW_NS).map(|request| request.request)
+    fn next(intake: &mut RequestIntake, word: u64, release_ns: u64) -> Option<Request> {
+        intake.next(word, NOW_NS, release_ns).map(|found| found.request)
     }
 
     #[test]
-    fn each_request_counts_once_also_one_of_the_topic_behind_a_word() {
-        let mut intake = RequestIntake::default();
-        let engage = topic(Request::Engage, 1);
-        assert_eq!(chosen(&mut intake, engage, 0), Some(Request::Engage));
-        assert_eq!(chosen(&mut intake, engage, 0), None);
-        let off = word(Request::Off, 0);
-        assert_eq!(chosen(&mut intake, engage, off), Some(Request::Off));
-        assert_eq!(chosen(&mut intake, engage, off), None, "an old engage must not follow an off");
-        // A request of the same cycle is lost.
-        let estop = word(Request::Estop, 0);
-        assert_eq!(chosen(&mut intake, topic(Request::Engage, 2), estop), Some(Request::Estop));
-        assert_eq!(chosen(&mut intake, topic(Request::Engage, 2), estop), None);
-    }
-
-    #[test]
-    fn a_stop_in_the_word_outlives_a_higher_request_and_an_engage_does_not() {
-        let mut intake = RequestIntake::default();
-        let stop = word(Request::Stop, 0);
-        assert_eq!(chosen(&mut intake, topic(Request::Off, 1), stop), Some(Request::Off));
-        assert_eq!(chosen(&mut intake, topic(Request::Off, 1), stop), Some(Request::Stop));
-        let engage = word(Request::Engage, 1000);
-        assert_eq!(chosen(&mut intake, topic(Request::Off, 2), engage), Some(Request::Off));
-        assert_eq!(chosen(&mut intake, topic(Request::Off, 2), engage), None);
-    }
-
-    #[test]
-    fn behind_a_pause_a_request_of_the_topic_stops_and_does_not_begin_control() {
-        for (is_simulated, pause_ns, is_held) in [
-            (false, MAX_REQUEST_AGE_NS, false),
-            (false, MAX_REQUEST_AGE_NS + 1, true),
-            (true, 60 * MAX_REQUEST_AGE_NS, false),
-        ] {
-            for request in Request::ALL {
-                let mut intake = RequestIntake::new(is_simulated);
-                intake.next(None, 0, NOW_NS);
-                let now_ns = NOW_NS + pause_ns;
-                let found = intake.next(topic(request, 1), 0, now_ns);
-                let is_lost = is_held && request.can_begin_control();
-                assert_eq!(found.is_none(), is_lost, "{request:?} {is_simulated} {pause_ns}");
-                assert_eq!(intake.next(topic(request, 1), 0, now_ns + 1), None, "nor later");
+    fn a_request_counts_once_and_an_old_one_stops_and_does_not_begin_control() {
+        for request in Request::ALL {
+            for (age_ns, is_old) in [(MAX_REQUEST_AGE_NS, false), (MAX_REQUEST_AGE_NS + 1_000_000, true)] {
+                let word = RequestWord::default().post(request as u32, NOW_NS - age_ns).unwrap();
+                let mut intake = RequestIntake::default();
+                let is_lost = is_old && request.can_begin_control();
+                assert_eq!(next(&mut intake, word, 1), (!is_lost).then_some(request), "{request:?}");
+                assert_eq!(next(&mut intake, word, 1), None, "{request:?} again");
             }
         }
+        assert_eq!(next(&mut RequestIntake::default(), 0, 1), None);
     }
 
+    /// Whatever the clock says; and a cycle that is long past begins no control.
     #[test]
-    fn an_old_word_stops_and_does_not_begin_control() {
+    fn a_request_acts_in_the_cycle_that_it_names_and_a_stop_does_not_wait() {
         for request in Request::ALL {
-            let old = of_word(word(request, MAX_REQUEST_AGE_NS + 1_000_000), NOW_NS);
-            assert_eq!(old.is_none(), request.can_begin_control(), "{request:?}");
-            assert_eq!(of_word(word(request, 0), NOW_NS).map(|found| found.request), Some(request));
+            let word = RequestWord::default();
+            let word = word.post_unless(request as u32, 1, Some(CYCLE_NS + 333), || false).unwrap();
+            let mut intake = RequestIntake::default();
+            let early = next(&mut intake, word, CYCLE_NS - 1_000);
+            assert_eq!(early, is_stop(request).then_some(request));
+            assert_eq!(next(&mut intake, word, CYCLE_NS + 333).or(early), Some(request));
+            assert_eq!(next(&mut intake, word, 2 * CYCLE_NS), None, "{request:?} again");
+            let late_ns = CYCLE_NS + MAX_REQUEST_AGE_NS + 1_000;
+            let late = next(&mut RequestIntake::default(), word, late_ns);
+            assert_eq!(late.is_none(), request.can_begin_control(), "{request:?}");
         }
-        assert_eq!(of_word(0, NOW_NS), None);
     }
 }

@@ -38,6 +38,7 @@ use super::start::{
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use hexad_client::messages::StatisticsMessage;
+use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::realtime::clock::Monotonic;
 use hexad_client::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode};
 use hexad_client::realtime::event::Event;
@@ -50,6 +51,7 @@ use hexad_client::realtime::triple_buffer::triple_buffer;
 use hexad_core::control::controller::{Controller, Output};
 use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::inputs::Input;
+use hexad_core::control::signals::state::Request;
 use hexad_machine::config::Config;
 
 /// Stack of each thread: twice the size used, and small because all of it is locked. The recorder uses most:
@@ -210,7 +212,7 @@ pub(super) fn run(
 
         let started = start(realtime, &ready, &go);
         if started.is_ok() {
-            supervise(config, flags, progress, &request_reload, stop);
+            supervise(config, flags, progress, &request_reload, word, stop);
         }
         drop((go, request_reload));
         ending = end_watch();
@@ -274,14 +276,13 @@ fn run_realtime(
     let _ = ThreadFiles::of_this_thread().map(|found| links.files.set(found));
     // No cycle begins before the main thread has accepted the shortfalls of all threads.
     links.go_ahead.recv().ok()?;
-    let (word, progress, mut intake) =
-        (links.word, links.progress, RequestIntake::new(realtime.is_simulated()));
+    let (word, progress, mut intake) = (links.word, links.progress, RequestIntake::default());
     let (mut handover, mut memories, mut watch) = (links.handover, links.memories, links.watch);
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();
         handover.begin_cycle(&mut controller, woke_ns);
         memories.begin_cycle(controller.memory());
-        input.request = intake.next(input.request, word.load(), woke_ns);
+        input.request = intake.next(word.load(), woke_ns, input.release_ns);
         watch.begin_cycle(input);
         let output = controller.step(input);
         watch.end_cycle(input.release_ns, output.platform.map(|platform| platform.pose));
@@ -316,6 +317,7 @@ fn supervise(
     flags: &Flags,
     progress: &Progress,
     request_reload: &Sender<Requester>,
+    word: &RequestWord,
     stop: &Stop,
 ) {
     let realtime = &config.deployment.realtime;
@@ -328,7 +330,9 @@ fn supervise(
     }
     supervision.end();
     info!("stopping");
+    // In this order: what is asked for after the stop is refused, and the stop overrules what was asked for before it.
     flags.is_ending.store(true, Ordering::Relaxed);
+    word.post(Request::Stop as u32, monotonic_ns());
     let began = Instant::now();
     while !flags.may_end.load(Ordering::Relaxed) {
         if stop.is_repeated() || began.elapsed() > MAX_STOP_TIME {

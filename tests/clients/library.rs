@@ -63,7 +63,7 @@ show(library.hexad_publish_measured(driver, 0, None))
 show(library.hexad_close(driver))
 show(library.hexad_close(None))
 source = library.hexad_open(b'NAME', Role.SOURCE)
-show(library.hexad_publish_request(source, 0, 99))
+show(library.hexad_request_in_cycle(source, 0, 99))
 show(library.hexad_close(source))
 show(library.hexad_request(b'NAME', 99, False, 1.0))
 show(library.hexad_request(b'NAME', 1, False, -1.0))
@@ -87,7 +87,7 @@ INVALID force is NULL
 INVALID measured is NULL
 OK 
 OK 
-INVALID no request has the number 99
+INVALID no request is 99
 OK 
 INVALID no request is 99
 INVALID within_s = -1 s is not between 0 and 86400 s

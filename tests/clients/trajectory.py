@@ -10,10 +10,11 @@ measurements of a plant in simulated time.
 
 import argparse
 import os
+import threading
 
 import numpy as np
 
-from hexad import Client, Role, Setpoint, monotonic_ns, sleep_until
+from hexad import Client, Role, Setpoint, monotonic_ns, request, sleep_until
 from hexad.messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, SETPOINT_KIND_MOTION, STATE_ACTIVE
 from mujoco_machine import COORDINATES, rows_of, write_rows
 
@@ -61,7 +62,7 @@ class Player:
             if status.state == STATE_ACTIVE:
                 self.began_ns = now_ns
             elif self.engage and status.diagnostic.code == DIAGNOSTIC_READY_TO_ENGAGE:
-                self.client.publish_request(now_ns, REQUEST_ENGAGE)
+                self.client.request_in_cycle(now_ns, REQUEST_ENGAGE)
         t = 0.0 if self.began_ns is None else (now_ns - self.began_ns) * 1e-9
         if t > self.trajectory.duration + SETTLE_S:
             return None
@@ -115,7 +116,9 @@ def main():
     given = arguments.parse_args()
     role, rows = Role.SOURCE | Role.SIMULATED if given.lockstep else Role.SOURCE, []
     with Client(given.name, role) as client:
-        player = Player(client, Trajectory(given.trajectory), given.engage)
+        player = Player(client, Trajectory(given.trajectory), given.engage and given.lockstep)
+        if given.engage and not given.lockstep:
+            threading.Thread(target=request, args=(given.name, "engage", True), daemon=True).start()
         run = run_in_lockstep if given.lockstep else run_in_real_time
         run(client, player, round(1e9 / given.rate_hz), rows)
     if given.record:

@@ -16,7 +16,7 @@ use nix::pty::{OpenptyResult, openpty};
 use nix::sys::termios::{FlowArg, tcflow};
 
 use hexad::messages::claim::running_daemons;
-use hexad::messages::{Bus, CommandMessage, Publisher, StatusMessage, Subscriber};
+use hexad::messages::{Bus, Publisher, SetpointMessage, StatusMessage, Subscriber};
 
 use crate::support::background::Background;
 use crate::support::children::{HANG, Hexad, hexad, signal};
@@ -35,7 +35,7 @@ const TRIALS: usize = 6;
 
 /// What fills every slot of the shared memory.
 pub struct Slots {
-    _commands: Vec<Publisher<CommandMessage>>,
+    _setpoints: Vec<Publisher<SetpointMessage>>,
     _statuses: Vec<Subscriber<StatusMessage>>,
     _nodes: Vec<Bus>,
 }
@@ -43,17 +43,17 @@ pub struct Slots {
 impl Slots {
     pub fn fill(machine: &str) -> Self {
         let bus = Bus::join(machine).expect("to join");
-        let _commands: Vec<_> = std::iter::from_fn(|| bus.publisher::<CommandMessage>().ok()).collect();
+        let _setpoints: Vec<_> = std::iter::from_fn(|| bus.publisher::<SetpointMessage>().ok()).collect();
         let _statuses: Vec<_> = std::iter::from_fn(|| bus.subscriber::<StatusMessage>(8).ok()).collect();
-        assert!(_commands.len() >= 16 && _statuses.len() >= 12, "room for others");
+        assert!(_setpoints.len() >= 2 && _statuses.len() >= 12, "room for others");
         // A node takes its place in a topic with its first port, and with that of the topic's own limit.
         let mut _nodes = vec![bus];
         while let Some(node) =
-            Bus::join(machine).ok().filter(|node| node.publisher::<CommandMessage>().is_ok())
+            Bus::join(machine).ok().filter(|node| node.publisher::<SetpointMessage>().is_ok())
         {
             _nodes.push(node);
         }
-        Self { _commands, _statuses, _nodes }
+        Self { _setpoints, _statuses, _nodes }
     }
 }
 

@@ -35,6 +35,10 @@ fn every_line_has_its_answer() {
         ),
         ("{\"version\": 1, \"request\": \"engage\", \"wiat\": true}\n", "unknown field `wiat`"),
         ("{\"version\": 1, \"request\": \"record\"}\n", "record needs an open file"),
+        (
+            "{\"version\": 1, \"request\": \"park\", \"cycle_ns\": 7}\n",
+            "cycle_ns names a cycle in simulated time",
+        ),
     ] {
         client.send(line);
         let answer = client.answer();

@@ -4,6 +4,7 @@ use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::Request;
 use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
+use hexad::realtime::request_word::{number, time_ns};
 
 use crate::support::children::Hexad;
 use crate::support::machine::PERIOD_NS;
@@ -51,8 +52,8 @@ fn a_killed_setpoint_source_comes_back() {
     // Who waits does so from before the source is back.
     let engages = Hexad::start(&trio.machine, "engage", &["--wait"]);
     trio.recorder.until("it is asked to engage", |recording| {
-        let asked = recording.commands.last()?;
-        (asked.request == Request::Engage as u32 && asked.header.time_ns > to_ns).then_some(())
+        let asked = *recording.requests.last()?;
+        (number(asked) == Request::Engage as u32 && time_ns(asked) > to_ns).then_some(())
     });
     trio.setpoints = Some(start_setpoints(&trio.machine));
     engages.ends().succeeds();

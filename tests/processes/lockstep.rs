@@ -3,21 +3,25 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 use std::{env, fs, thread};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::config::Config;
+use hexad::control::signals::state::State;
 use hexad::messages::Bus;
 use hexad::messages::layout::FieldType;
-use hexad::messages::{ForceMessage, MeasuredMessage};
+use hexad::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use hexad::realtime::setup::scheduling;
+use serde_json::json;
 
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PERIOD_NS};
 use crate::support::operator;
 use crate::support::recorder::Recorder;
-use crate::support::trio::player_ended;
+use crate::support::socket::Client;
+use crate::support::trio::{player_ended, start_daemon};
 use hexad_support::shipped;
 
 const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
@@ -195,6 +199,69 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     assert!(!words.contains("did not come to rest"), "{words}");
     player_ended(source);
     plant.stops();
+}
+
+/// The forces, and what the status says of requests, of a run that is engaged in one cycle, from the first on, and then stopped.
+fn requested_by_cycle() -> Vec<([u64; 3], Vec<u8>)> {
+    const ENGAGED_IN: u64 = 20;
+    const STOPPED_IN: u64 = 40;
+    let machine = Machine::with("lock-step-cycle", LOCKSTEP);
+    let daemon = start_daemon(&machine);
+    let mut operator = Client::connect(&daemon);
+    let posts = |operator: &mut Client, request: &str, cycle: u64| {
+        let waits = operator.ask(request, &json!({"cycle_ns": cycle * PERIOD_NS}));
+        let text = format!("posted for the cycle at {} ns", cycle * PERIOD_NS);
+        assert_eq!([&waits["result"], &waits["text"]], ["waiting", text.as_str()], "{waits}");
+    };
+    let bus = Bus::join_simulated(&machine.name).expect("to join");
+    let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
+    let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
+    let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
+    let mut statuses = bus.subscriber::<StatusMessage>(8).expect("to subscribe");
+    let config = Config::load(&machine.file).expect("the machine file");
+    let mut hardware = config.deployment.plant.hardware(&config.machine);
+    let setpoint = SetpointMessage { x: config.machine.home, ..SetpointMessage::default() };
+    let mut found = vec![];
+    posts(&mut operator, "engage", ENGAGED_IN);
+    for cycle in 0..STOPPED_IN + 5 {
+        let time_ns = cycle * PERIOD_NS;
+        let (length_m, length_rate_m_s) = hardware.measure();
+        let message = MeasuredMessage { length_m, length_rate_m_s, rates_valid: 1, ..Default::default() };
+        // No stop waits, so it is sent for its cycle, before the setpoint.
+        if cycle == STOPPED_IN {
+            posts(&mut operator, "estop", STOPPED_IN);
+        }
+        let began = Instant::now();
+        let force = loop {
+            measured.publish(time_ns, message).expect("to send");
+            setpoints.publish(time_ns, setpoint).expect("to send");
+            sleep(Duration::from_millis(1));
+            if let Some(force) = forces.receive_latest() {
+                break force;
+            }
+            assert!(began.elapsed() < HANG, "no force for {time_ns}");
+        };
+        assert_eq!(force.release_ns, time_ns);
+        hardware.advance(PERIOD_NS, force.may_be_applied(time_ns, 0).then_some(force.force_n));
+        let status = statuses.receive_latest().expect("the status comes first");
+        let is_engaged = [State::Engaging as u32, State::Active as u32].contains(&status.state);
+        assert_eq!(is_engaged, (ENGAGED_IN..STOPPED_IN).contains(&cycle), "cycle {cycle}: {status:?}");
+        let answered = [u64::from(status.state), status.request_epoch, status.request_sequence];
+        found.push((answered, bytes(&force)));
+        match cycle {
+            ENGAGED_IN => assert_eq!(operator.answer()["result"], "accepted"),
+            STOPPED_IN => assert_eq!(operator.answer()["result"], "done"),
+            _ => {}
+        }
+    }
+    daemon.stops();
+    found
+}
+
+#[test]
+#[apply(beside_others)]
+fn in_lock_step_a_request_acts_in_the_cycle_that_it_names_and_the_run_is_repeatable() {
+    assert_eq!(requested_by_cycle(), requested_by_cycle());
 }
 
 /// From its first message on the daemon follows a source: it must not be home.

@@ -2,6 +2,7 @@
 
 use hexad::messages::SetpointMessage;
 use hexad::messages::clock::monotonic_ns;
+use hexad::realtime::request_word::number;
 
 use crate::support::background::publish;
 use crate::support::children::Hexad;
@@ -93,8 +94,9 @@ fn what_is_refused_is_refused_with_the_reason() {
          is enough): the platform then moves to them (10.000 mm and 0.000 mrad away)";
     is_refused(&machine, "engage", &[], words);
     let waits = Hexad::start(&machine, "engage", &["--wait"]);
-    let asked =
-        |recording: &Recording| recording.commands.iter().filter(|asked| asked.request == 1).nth(9).map(drop);
+    let asked = |recording: &Recording| {
+        recording.requests.iter().filter(|asked| number(**asked) == 1).nth(9).map(drop)
+    };
     recorder.until("it asks again and again", asked);
     waits.signal("INT");
     let stderr = waits.ends().fails(1, "hexad: waiting: setpoint too far from the platform: ");

@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-use hexad::commands::in_step::Operator;
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::state::{Request, State};
-use hexad::messages::Bus;
+use hexad::control::signals::state::State;
 use hexad::messages::clock::monotonic_ns;
 use serde_json::json;
 
@@ -28,16 +26,11 @@ fn an_old_engage_is_not_obeyed_and_a_fresh_one_is() {
     let machine = Machine::patient("old-engage");
     let recorder = Recorder::start(&machine.name);
     let daemon = start_daemon(&machine);
-    let Controlled { peer: _peer, daemon, plant, machine } = Controlled::ready(machine, daemon);
+    let Controlled { peer: _peer, daemon, plant, machine: _machine } = Controlled::ready(machine, daemon);
     daemon.says("standby: ready to engage");
-    let bus = Bus::join(&machine.name).expect("to join");
-    let mut operator = Operator::new(&bus).expect("to ask");
     let mut client = Client::connect(&daemon);
-    // The daemon connects to the publisher while it runs.
-    let_pass(Duration::from_millis(200));
     let from_ns = monotonic_ns();
     daemon.hold();
-    operator.send(Request::Engage).expect("to send");
     client.send("{\"version\": 1, \"request\": \"engage\"}\n");
     let_pass(PAUSE);
     daemon.signal("CONT");
@@ -47,7 +40,7 @@ fn an_old_engage_is_not_obeyed_and_a_fresh_one_is() {
     let_pass(AFTERWARDS);
     let is_obeyed = recorder.so_far().forces.iter().any(|force| valid_after(force, from_ns));
     assert!(!is_obeyed, "an old request was obeyed");
-    operator.send(Request::Engage).expect("to send");
+    assert_eq!(client.ask("engage", &json!({}))["result"], "accepted");
     recorder.until("a fresh request is obeyed", |recording| {
         recording.forces.last().filter(|force| force.state == State::Active as u32).map(drop)
     });

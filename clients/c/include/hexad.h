@@ -7,7 +7,8 @@
  * hexad_last_error is that of the calling thread. A machine may be used in any number of threads at once.
  *
  * Real time: hexad_open allocates and may take milliseconds. Publishing and hexad_latest_* neither allocate nor wait,
- * except while a participant connects or leaves (up to 0.1 ms). hexad_request waits: call it in another thread.
+ * except while a participant connects or leaves (up to 0.1 ms). hexad_request and hexad_request_in_cycle wait: call
+ * hexad_request in another thread.
  */
 
 #ifndef HEXAD_H
@@ -24,7 +25,7 @@
 // Role of a client: publishes measurements and receives forces.
 #define HEXAD_DRIVER 1
 
-// Role of a client: publishes setpoints and in-band requests; receives status, statistics and measurements.
+// Role of a client: publishes setpoints; receives status, statistics and measurements.
 #define HEXAD_SOURCE 2
 
 // Role of a client: receives status, statistics and measurements.
@@ -155,14 +156,16 @@ enum hexad_result hexad_publish_setpoint(struct hexad_client *client,
                                          uint64_t time_ns,
                                          const struct hexad_setpoint *setpoint);
 
-// Publishes a request (HEXAD_REQUEST_...) in step with the setpoints. The status shows what became of it.
+// Sends a request (HEXAD_REQUEST_...) for a cycle in simulated time, and returns when the daemon has posted it: call it before
+// hexad_publish_setpoint with the same time. The cycle at `cycle_ns` obeys it, none before, but a stop, off or estop does not wait. The
+// status of that cycle shows whether it was refused. It waits for the daemon, up to 3 s; in real time use hexad_request.
 //
 // # Safety
 //
 // `client` is NULL or from hexad_open.
-enum hexad_result hexad_publish_request(struct hexad_client *client,
-                                        uint64_t time_ns,
-                                        uint32_t request);
+enum hexad_result hexad_request_in_cycle(struct hexad_client *client,
+                                         uint64_t cycle_ns,
+                                         uint32_t request);
 
 // The newest status: HEXAD_OK if one has arrived since the client was opened, else HEXAD_NOTHING. The same message is
 // returned again until another arrives; its header has the time.

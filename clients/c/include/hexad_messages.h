@@ -159,20 +159,6 @@ static_assert(offsetof(struct hexad_measured, brake_open) == 240, "brake_open");
 static_assert(offsetof(struct hexad_measured, drive_fault) == 244, "drive_fault");
 static_assert(offsetof(struct hexad_measured, force_n) == 248, "force_n");
 
-#define HEXAD_COMMAND_TOPIC "command"
-#define HEXAD_COMMAND_SCHEMA 5u
-/* Request of a program that sends it in step with its setpoints, one per message. Operators use the control socket. */
-struct hexad_command {
-    struct hexad_header header; /* Schema version, publisher, sequence number and time stamp. */
-    uint32_t request; /* Number of the `Request`. */
-    uint32_t reserved; /* Zero. */
-};
-static_assert(sizeof(struct hexad_command) == 40, "size");
-static_assert(alignof(struct hexad_command) == 8, "alignment");
-static_assert(offsetof(struct hexad_command, header) == 0, "header");
-static_assert(offsetof(struct hexad_command, request) == 32, "request");
-static_assert(offsetof(struct hexad_command, reserved) == 36, "reserved");
-
 #define HEXAD_FORCE_TOPIC "force"
 #define HEXAD_FORCE_SCHEMA 5u
 /* Actuator forces of one cycle. A driver brakes at a message that is not `valid`, and when its own watchdog has seen no applicable message for too long. A message is applicable only if schema and checksum are right, the sequence number increases and `time_ns` is neither in the future nor too old. */
@@ -265,8 +251,8 @@ struct hexad_status {
     uint32_t state; /* Number of the `State`. */
     uint32_t active_limits; /* Bits of the `Limit`s that this cycle has reached, or nearly. */
     struct hexad_diagnostic diagnostic; /* Why the state is not active, or soon will not be. */
-    uint64_t request_epoch; /* Epoch of the last command message that was carried out or refused; the largest number for a request over the control socket or by a signal. */
-    uint64_t request_sequence; /* Sequence number of that message; a number that identifies the other requests. */
+    uint64_t request_epoch; /* The largest number once a request was carried out or refused. */
+    uint64_t request_sequence; /* Number that identifies that request. */
     struct hexad_diagnostic request_diagnostic; /* Why that request was refused; code 0 if it was carried out. */
     uint32_t pose_valid; /* 1 if the fields from `x` to `time_to_singularity_s` are valid. */
     uint32_t error_valid; /* 1 if `position_error_m` and `orientation_error_rad` are valid. */

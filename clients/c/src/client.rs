@@ -5,12 +5,14 @@ use std::sync::{Mutex, TryLockError};
 
 use ::hexad_client::messages::clock::monotonic_ns;
 use ::hexad_client::messages::{
-    Bus, CommandMessage, ForceMessage, MeasuredMessage, Message, Publisher, SetpointMessage,
-    StatisticsMessage, StatusMessage, Subscriber,
+    Bus, ForceMessage, MeasuredMessage, Message, Publisher, SetpointMessage, StatisticsMessage,
+    StatusMessage, Subscriber,
 };
+use ::hexad_client::operator::connection::Connection;
 
 use crate::outcome::hexad_result::{HEXAD_BUSY, HEXAD_INTERNAL, HEXAD_INVALID, HEXAD_OK};
 use crate::outcome::{Failure, Outcome};
+use crate::request;
 use crate::{HEXAD_DRIVER, HEXAD_MONITOR, HEXAD_SIMULATED, HEXAD_SOURCE};
 
 /// Messages that a port keeps; only the newest counts.
@@ -44,7 +46,9 @@ pub struct Driver {
 /// Ports of a setpoint source.
 pub struct Source {
     setpoints: Publisher<SetpointMessage>,
-    requests: Publisher<CommandMessage>,
+    machine: String,
+    /// Keeps the last request for a cycle.
+    posted: Option<Connection>,
 }
 
 /// Ports that only receive.
@@ -106,7 +110,7 @@ impl Ports {
         let join = if has(HEXAD_SIMULATED) { Bus::join_simulated } else { Bus::join };
         let bus = join(machine).map_err(Failure::of_port)?;
         let driver = if has(HEXAD_DRIVER) { Some(Driver::open(&bus)?) } else { None };
-        let source = if has(HEXAD_SOURCE) { Some(Source::open(&bus)?) } else { None };
+        let source = if has(HEXAD_SOURCE) { Some(Source::open(&bus, machine)?) } else { None };
         let monitor = if has(HEXAD_SOURCE | HEXAD_MONITOR) { Some(Monitor::open(&bus)?) } else { None };
         Ok(Self { driver, source, monitor, _bus: bus })
     }
@@ -168,8 +172,8 @@ impl Driver {
 }
 
 impl Source {
-    fn open(bus: &Bus) -> Result<Self, Failure> {
-        Ok(Self { setpoints: publisher(bus)?, requests: publisher(bus)? })
+    fn open(bus: &Bus, machine: &str) -> Result<Self, Failure> {
+        Ok(Self { setpoints: publisher(bus)?, machine: machine.into(), posted: None })
     }
 
     /// Publishes a setpoint.
@@ -177,15 +181,10 @@ impl Source {
         publish(&mut self.setpoints, time_ns, message)
     }
 
-    /// Publishes a request, if there is one of its number.
-    pub fn publish_request(&mut self, time_ns: u64, message: CommandMessage) -> Outcome {
-        if message.request().is_none() {
-            return Err(Failure::new(
-                HEXAD_INVALID,
-                format!("no request has the number {}", message.request),
-            ));
-        }
-        publish(&mut self.requests, time_ns, message)
+    /// Posts a request for a cycle.
+    pub fn request_in_cycle(&mut self, cycle_ns: u64, request: u32) -> Outcome {
+        self.posted = Some(request::post(&self.machine, request, cycle_ns)?);
+        Ok(HEXAD_OK)
     }
 }
 

@@ -17,7 +17,7 @@ use std::ptr;
 
 use ::hexad_client::messages::clock::monotonic_ns;
 use ::hexad_client::messages::{
-    CommandMessage, ForceMessage, MeasuredMessage, SetpointMessage, StatisticsMessage, StatusMessage,
+    ForceMessage, MeasuredMessage, SetpointMessage, StatisticsMessage, StatusMessage,
 };
 
 use self::client::{Ports, hexad_client, with};
@@ -29,7 +29,7 @@ pub const HEXAD_ABI: u32 = 0;
 
 /// Role of a client: publishes measurements and receives forces.
 pub const HEXAD_DRIVER: u32 = 1;
-/// Role of a client: publishes setpoints and in-band requests; receives status, statistics and measurements.
+/// Role of a client: publishes setpoints; receives status, statistics and measurements.
 pub const HEXAD_SOURCE: u32 = 2;
 /// Role of a client: receives status, statistics and measurements.
 pub const HEXAD_MONITOR: u32 = 4;
@@ -178,22 +178,21 @@ pub unsafe extern "C" fn hexad_publish_setpoint(
     })
 }
 
-/// Publishes a request (HEXAD_REQUEST_...) in step with the setpoints. The status shows what became of it.
+/// Sends a request (HEXAD_REQUEST_...) for a cycle in simulated time, and returns when the daemon has posted it: call it before
+/// hexad_publish_setpoint with the same time. The cycle at `cycle_ns` obeys it, none before, but a stop, off or estop does not wait. The
+/// status of that cycle shows whether it was refused. It waits for the daemon, up to 3 s; in real time use hexad_request.
 ///
 /// # Safety
 ///
 /// `client` is NULL or from hexad_open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hexad_publish_request(
+pub unsafe extern "C" fn hexad_request_in_cycle(
     client: *mut hexad_client,
-    time_ns: u64,
+    cycle_ns: u64,
     request: u32,
 ) -> hexad_result {
-    guard(|| {
-        let message = CommandMessage { request, ..CommandMessage::default() };
-        // SAFETY: the caller's promise.
-        unsafe { with(client, |ports| ports.source()?.publish_request(time_ns, message)) }
-    })
+    // SAFETY: the caller's promise.
+    guard(|| unsafe { with(client, |ports| ports.source()?.request_in_cycle(cycle_ns, request)) })
 }
 
 /// The newest status: HEXAD_OK if one has arrived since the client was opened, else HEXAD_NOTHING. The same message is

@@ -15,6 +15,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
+use super::lease::PUBLISHERS;
 use super::location::{Location, SEGMENTS_DELETED};
 use super::reservation::refusal;
 use super::{LeasedSubscriber, Message, Publisher, Subscriber};
@@ -180,7 +181,7 @@ impl Bus {
         let service_name = name.as_str().try_into().map_err(port_error(format!("bad topic {name}")))?;
         let open = || {
             let builder = self.node.service_builder(&service_name).publish_subscribe::<T>();
-            let builder = builder.max_publishers(T::MAX_PUBLISHERS).max_subscribers(MAX_SUBSCRIBERS);
+            let builder = builder.max_publishers(PUBLISHERS).max_subscribers(MAX_SUBSCRIBERS);
             let builder = builder.max_nodes(MAX_NODES).subscriber_max_buffer_size(BUFFER);
             builder.enable_safe_overflow(true).history_size(0).open_or_create()
         };

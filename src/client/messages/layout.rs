@@ -159,13 +159,12 @@ impl<T: FieldType, const N: usize> FieldType for [T; N] {
 
 /// Declares a `#[repr(C)]` struct: its fields with type, unit and meaning.
 ///
-/// `on "topic" schema 1` makes it a [`Message`](super::Message), whose first field is the header. `publishers` is the
-/// largest number of simultaneous publishers, if it differs from the default. `sealed by` names the field with the
-/// checksum of the fields before it. A struct with gaps between its fields does not compile.
+/// `on "topic" schema 1` makes it a [`Message`](super::Message), whose first field is the header. `sealed by` names
+/// the field with the checksum of the fields before it. A struct with gaps between its fields does not compile.
 macro_rules! message {
     (
         $(#[doc = $doc:literal])*
-        $name:ident = $type_name:tt $(on $topic:literal schema $schema:literal $(publishers $publishers:literal)? $(sealed by $checksum:ident)?)? {
+        $name:ident = $type_name:tt $(on $topic:literal schema $schema:literal $(sealed by $checksum:ident)?)? {
             $($(#[doc = $field_doc:literal])* $field:ident: $type:ty $([$unit:literal])?,)*
         }
     ) => {
@@ -214,7 +213,6 @@ macro_rules! message {
         $(impl $crate::messages::Message for $name {
             const TOPIC: &'static str = $topic;
             const SCHEMA: u32 = $schema;
-            $(const MAX_PUBLISHERS: usize = $publishers;)?
 
             fn header(&self) -> &$crate::messages::Header {
                 &self.header

@@ -9,7 +9,8 @@
 use super::Message;
 use hexad_core::control::signals::inputs::Publishers;
 
-/// Number of remembered publishers: the largest number of simultaneous publishers of a topic.
+/// Most publishers of a topic at once, all of which are remembered: one life is meant; one more may be stopped (SIGSTOP) or dying, two are
+/// reserve.
 pub(super) const PUBLISHERS: usize = 4;
 
 /// Publisher of a topic, by its messages.

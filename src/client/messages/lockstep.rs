@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! plant            measured, time_ns = t                    the clock
-//! setpoint source  responds with a setpoint of time_ns = t, after a request if there is one
+//! setpoint source  responds with a setpoint of time_ns = t, after its request for that cycle is posted
 //! daemon           has both: one cycle; status, then force, release_ns = time_ns = t
 //! plant            has the force: simulates a period, t + period
 //! ```

@@ -12,10 +12,10 @@
 //! | | |
 //! | --- | --- |
 //! | iceoryx2 | 0.9.3 exactly, publish-subscribe, IPC service, no user header |
-//! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status`, `statistics` |
+//! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `force`, `status`, `statistics` |
 //! | type name | `hexad_<last part>` |
 //! | opening a service | open or create: the first participant sets the settings for all |
-//! | settings, ports | `max_publishers` 4, of `command` 16; `max_subscribers` 16; `max_nodes` 32 |
+//! | settings, ports | `max_publishers` 4; `max_subscribers` 16; `max_nodes` 32 |
 //! | settings, buffers | `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0 |
 //! | user | all participants of a machine run as one user |
 //! | root path | `iceoryx2` in the folder of the user, mode 0700 |
@@ -32,15 +32,14 @@
 //! intact and follows all before in the order of (epoch, sequence): the last message of a publisher that died may still
 //! arrive.
 //!
-//! Operators send requests over the control socket (`docs/operator.md`). The topic `command` is for programs whose requests
-//! belong to an instant of their setpoints.
+//! Requests go over the control socket (`docs/operator.md`).
 //!
 //! # In simulated time
 //!
 //! With `realtime.release = "lockstep"` the topics are `hexad-simulated/<name>/...`. All times are those of the plant, which
 //! may begin at any instant; the epoch of `force` is the time of its first message. In each step the plant publishes
-//! `measured` of an instant; the setpoint source responds with `setpoint` of that `time_ns`, after a `command` if there is
-//! one; the daemon publishes `status`, then `force`, with that instant as `time_ns` and `release_ns`; the plant simulates one
+//! `measured` of an instant; the setpoint source responds with `setpoint` of that `time_ns`, after the daemon has posted its
+//! request for that cycle if there is one; the daemon publishes `status`, then `force`, with that instant as `time_ns` and `release_ns`; the plant simulates one
 //! period. A plant that receives no response repeats its message, and a source repeats its response: a participant may not
 //! be connected yet. When the setpoint source has left, the daemon continues without setpoints.
 
@@ -50,7 +49,6 @@ mod bus;
 pub mod cdr;
 pub mod claim;
 pub mod clock;
-mod command;
 mod cycle;
 mod force;
 mod header;
@@ -71,7 +69,6 @@ mod subscriber;
 
 pub use self::bus::{Bus, PortError, TopicObserver};
 pub use self::claim::Claim;
-pub use self::command::{CommandMessage, MAX_REQUEST_AGE_NS};
 pub use self::cycle::{CycleMessage, GapMessage};
 pub use self::force::ForceMessage;
 pub use self::header::Header;
@@ -89,10 +86,9 @@ pub use self::subscriber::{LeasedSubscriber, Subscriber};
 use self::layout::{Declared, Layout};
 
 /// Layouts of all messages.
-pub const MESSAGES: [&Layout; 6] = [
+pub const MESSAGES: [&Layout; 5] = [
     &SetpointMessage::LAYOUT,
     &MeasuredMessage::LAYOUT,
-    &CommandMessage::LAYOUT,
     &ForceMessage::LAYOUT,
     &StatusMessage::LAYOUT,
     &StatisticsMessage::LAYOUT,
@@ -105,10 +101,6 @@ pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
 
     /// Version of the message. Any change of layout or meaning raises it, also of a struct that it contains.
     const SCHEMA: u32;
-
-    /// Most publishers of the topic at once: one life is meant; one more may be stopped (SIGSTOP) or dying, two are
-    /// reserve.
-    const MAX_PUBLISHERS: usize = 4;
 
     /// Schema version, publisher, sequence number and time stamp of the message.
     fn header(&self) -> &Header;

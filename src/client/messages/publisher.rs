@@ -1,6 +1,5 @@
 //! Publishing one topic.
 
-use hexad_core::control::signals::state::MessageId;
 use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::prelude::ipc;
 
@@ -30,11 +29,6 @@ impl<T: Message> Publisher<T> {
     /// last message of the previous one.
     pub fn begin_epoch(&mut self) {
         self.epoch = Some(monotonic_ns());
-    }
-
-    /// Identity of the next message.
-    pub fn next_message(&self) -> MessageId {
-        MessageId { epoch: self.epoch.unwrap_or_default(), sequence: self.sequence + 1 }
     }
 
     /// Fills in the header and sends. `time_ns` is the instant at which the content holds.

@@ -36,10 +36,9 @@ message! {
         active_limits: u32,
         /// Why the state is not active, or soon will not be.
         diagnostic: DiagnosticRecord,
-        /// Epoch of the last command message that was carried out or refused; the largest number for a request over the
-        /// control socket or by a signal.
+        /// The largest number once a request was carried out or refused.
         request_epoch: u64,
-        /// Sequence number of that message; a number that identifies the other requests.
+        /// Number that identifies that request.
         request_sequence: u64,
         /// Why that request was refused; code 0 if it was carried out.
         request_diagnostic: DiagnosticRecord,

@@ -30,7 +30,7 @@ pub struct Subscriber<T: Message> {
 
 impl<T: Message> Subscriber<T> {
     /// Most messages that the buffers of all publishers hold: bounds the time of one call, however fast they publish.
-    const MAX_PENDING: usize = T::MAX_PUBLISHERS * BUFFER;
+    const MAX_PENDING: usize = PUBLISHERS * BUFFER;
 
     pub(super) fn new(
         service: PortFactory<ipc::Service, T, ()>,

@@ -15,6 +15,10 @@ pub fn is_stop(request: Request) -> bool {
 /// Version of the protocol. It is raised only if an older client would misinterpret it.
 pub const VERSION: u32 = 1;
 
+/// Largest age of a request that may begin control \[ns\]. The sender of an older one has long stopped
+/// waiting.
+pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
+
 /// Longest waiting time if the request gives none \[s\].
 const DEFAULT_WITHIN_S: f64 = 30.0;
 
@@ -52,6 +56,11 @@ pub struct RequestLine {
     /// Longest time to wait \[s\].
     #[serde(default = "default_within_s")]
     pub within_s: f64,
+    /// Instant of the cycle before which a request to the controller is not obeyed, in simulated time \[ns\]; `None` for the next
+    /// cycle. A line with result `waiting` then says that it is posted: the setpoint of that cycle may be published. A stop does not
+    /// wait for its cycle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cycle_ns: Option<u64>,
     /// Length of a recording \[s\]; `None` for all cycles that are kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,

@@ -7,15 +7,17 @@ use std::time::{Duration, Instant};
 use super::connection::{Attempt, Connection};
 use super::endpoint::{Endpoint, endpoints};
 use super::exchange::converse;
-use super::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
+use super::protocol::{AnswerLine, MAX_REQUEST_AGE_NS, RequestLine, RequestResult, STOPPED};
 use super::ride::{RideOrder, RidePhase};
 use super::status_report::StopNumber;
 use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
-use crate::messages::MAX_REQUEST_AGE_NS;
 use hexad_core::control::signals::state::Request;
 
 /// Longest wait for the first line of the daemon: longer than the daemon waits for its loop.
 const FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
+
+/// Longest wait for a cycle in simulated time: a day, as a participant may be held.
+const CYCLE_LIMIT: Duration = Duration::from_secs(86_400);
 
 /// Longest wait of a patient request for a daemon that is about to start.
 const DAEMON_START_LIMIT: Duration = Duration::from_secs(2);
@@ -65,6 +67,27 @@ fn attempt(
         Err(_) if interrupted() => Err(OperatorError::Interrupted),
         Err(OperatorError::NoAnswer(reason)) => Err(OperatorError::NotConfirmed(order.request, reason)),
         Err(error) => Err(error),
+    }
+}
+
+/// Posts a request of a setpoint source for a cycle in simulated time. Returns once it is posted: the source may then publish its setpoint
+/// of that cycle. The status of the cycle shows whether it was refused. When the connection closes before the cycle, it is withdrawn.
+pub fn post_for_cycle(machine: &str, request: Request, cycle_ns: u64) -> Result<Connection, OperatorError> {
+    let line = RequestLine {
+        cycle_ns: Some(cycle_ns),
+        within_s: CYCLE_LIMIT.as_secs_f64(),
+        ..RequestLine::new(request.name())
+    };
+    let (connection, first) = first_answer(machine, |endpoint| {
+        ask_at(endpoint, Endpoint::connect, |mut connection| {
+            connection.send(&line)?;
+            let first = connection.receive(Instant::now() + FIRST_LINE_LIMIT, || false)?;
+            Ok(first.map(|first| (connection, first)))
+        })
+    })?;
+    match first.result {
+        RequestResult::Waiting => Ok(connection),
+        _ => Order::new(request, CYCLE_LIMIT).conclude(first).map(|_| connection),
     }
 }
 

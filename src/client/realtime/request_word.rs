@@ -5,15 +5,19 @@
 //!
 //! | bits | content |
 //! | --- | --- |
-//! | 60 to 63 | number of the request, 0 for none |
+//! | 63 | whether the instant is that of a cycle in simulated time |
+//! | 60 to 62 | number of the request, 0 for none |
 //! | 52 to 59 | ticket: distinguishes requests of the same microsecond |
-//! | 0 to 51 | CLOCK_MONOTONIC instant of the request \[us\]: 142 years |
+//! | 0 to 51 | instant \[us\], for 142 years: CLOCK_MONOTONIC of the request, or the cycle before which it is not obeyed |
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 const TIME_BITS: u32 = 52;
 const NUMBER_SHIFT: u32 = 60;
+const NUMBER_BITS: u32 = 3;
 const TIME_MASK: u64 = (1 << TIME_BITS) - 1;
+const NUMBER_MASK: u64 = (1 << NUMBER_BITS) - 1;
+const CYCLE_BIT: u64 = 1 << (NUMBER_SHIFT + NUMBER_BITS);
 
 /// Word that requests are posted to and the real-time thread loads.
 #[derive(Debug, Default)]
@@ -23,17 +27,22 @@ pub struct RequestWord {
     seen: AtomicU64,
     ticket: AtomicU8,
     /// How often each request was posted, by its number.
-    posts: [AtomicU32; 1 << (u64::BITS - NUMBER_SHIFT)],
+    posts: [AtomicU32; 1 << NUMBER_BITS],
 }
 
 /// Number of the request in a word; 0 for none.
 pub fn number(word: u64) -> u32 {
-    (word >> NUMBER_SHIFT) as u32
+    (word >> NUMBER_SHIFT & NUMBER_MASK) as u32
 }
 
-/// Instant at which a word was posted, CLOCK_MONOTONIC \[ns\], to the microsecond.
+/// Instant of a word \[ns\], to the microsecond: of the request, CLOCK_MONOTONIC, or of the cycle that it names.
 pub fn time_ns(word: u64) -> u64 {
     (word & TIME_MASK) * 1000
+}
+
+/// Instant of the cycle that a word names, if it names one \[ns\].
+pub fn cycle_ns(word: u64) -> Option<u64> {
+    (word & CYCLE_BIT != 0).then(|| time_ns(word))
 }
 
 impl RequestWord {
@@ -53,25 +62,31 @@ impl RequestWord {
     /// request of higher precedence waits.
     pub fn post(&self, request: u32, now_ns: u64) -> Option<u64> {
         self.count(request);
-        self.post_if(request, now_ns, || true)
+        self.post_if(self.new_word(request, now_ns), || true)
     }
 
-    /// Posts a request unless `is_overruled`, which compares [`Self::posts_above`]. A stop that is counted before the word is exchanged
-    /// prevents it.
-    pub fn post_unless(&self, request: u32, now_ns: u64, is_overruled: impl Fn() -> bool) -> Option<u64> {
-        let posted = self.post_if(request, now_ns, || !is_overruled());
-        posted.inspect(|_| self.count(request))
+    /// Posts a request, for a cycle in simulated time if it names one, unless `is_overruled`, which compares [`Self::posts_above`].
+    /// A stop that is counted before the word is exchanged prevents it.
+    pub fn post_unless(
+        &self,
+        request: u32,
+        now_ns: u64,
+        cycle_ns: Option<u64>,
+        is_overruled: impl Fn() -> bool,
+    ) -> Option<u64> {
+        let of_cycle = |cycle_ns| self.new_word(request, cycle_ns) | CYCLE_BIT;
+        let new = cycle_ns.map_or_else(|| self.new_word(request, now_ns), of_cycle);
+        self.post_if(new, || !is_overruled()).inspect(|_| self.count(request))
     }
 
-    /// Counts a request that reaches the real-time thread by another way.
-    pub fn count(&self, request: u32) {
+    fn count(&self, request: u32) {
         if let Some(posts) = self.posts.get(request as usize) {
             posts.fetch_add(1, Ordering::SeqCst);
         }
     }
 
-    fn post_if(&self, request: u32, now_ns: u64, counts: impl Fn() -> bool) -> Option<u64> {
-        let new = self.new_word(request, now_ns);
+    fn post_if(&self, new: u64, counts: impl Fn() -> bool) -> Option<u64> {
+        let request = number(new);
         let mut current = self.load();
         loop {
             let waiting = if current == self.seen.load(Ordering::Acquire) { 0 } else { number(current) };
@@ -79,7 +94,7 @@ impl RequestWord {
             if !counts() {
                 return None;
             }
-            if waiting == request {
+            if waiting == request && cycle_ns(current) == cycle_ns(new) {
                 return Some(current);
             }
             if waiting > request {
@@ -121,6 +136,17 @@ mod tests {
         let word = RequestWord::default();
         let posted = word.post(ESTOP, 123_456_789_999).unwrap();
         assert_eq!((number(posted), time_ns(posted), word.load()), (ESTOP, 123_456_789_000, posted));
+    }
+
+    #[test]
+    fn a_word_of_a_cycle_is_not_shared_with_one_of_now_or_of_another_cycle() {
+        let word = RequestWord::default();
+        let posted = [Some(7_000), None, Some(7_000), Some(8_000)]
+            .map(|cycle_ns| word.post_unless(1, 123_000, cycle_ns, || false).unwrap());
+        assert_eq!(posted.map(cycle_ns), [Some(7_000), None, Some(7_000), Some(8_000)]);
+        assert_eq!(posted.map(number), [1; 4]);
+        assert_eq!(word.post_unless(1, 124_000, Some(8_000), || false), Some(posted[3]), "the same request");
+        assert_eq!(word.load(), posted[3]);
     }
 
     #[test]

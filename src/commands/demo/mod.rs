@@ -14,14 +14,12 @@ use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
 use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, built_in_motion, duration};
 use super::failure::{CommandError, Failure};
-use super::in_step::Operator;
 use super::progress::time_bar;
 use super::report::{self, ReportError, recordings_in};
 use crate::output::svg::ChartError;
-use hexad_client::messages::PortError;
+use hexad_client::messages::{PortError, StatusMessage, Subscriber};
 use hexad_client::realtime::stop_request::Stop;
-use hexad_core::control::signals::diagnostic::DiagnosticCode;
-use hexad_core::control::signals::state::{Request, State};
+use hexad_core::control::signals::state::State;
 use hexad_core::motion::built_in::BuiltInMotion;
 use hexad_daemon::recording::RecordingError;
 use hexad_daemon::report::Report;
@@ -227,13 +225,12 @@ impl Stage {
             ChildProcess::start("run", controller.into_iter().chain(report).chain(records).chain(size))?;
         let setpoints = ChildProcess::start(
             "move",
-            controller
-                .into_iter()
-                .chain(["--motion", demo.motion.name(), "--seconds", &seconds].map(AsRef::as_ref)),
+            controller.into_iter().chain(
+                ["--motion", demo.motion.name(), "--seconds", &seconds, "--engage"].map(AsRef::as_ref),
+            ),
         )?;
         let mut processes = vec![plant, daemon, setpoints];
-        let operator = Operator::new(&bus)?;
-        let watched = watch(&mut processes, &mut recorder, operator, demo.seconds, stop);
+        let watched = watch(&mut processes, &mut recorder, bus.subscriber(8)?, demo.seconds, stop);
         // In reverse order of their start: the setpoint source has ended, the daemon publishes that no force
         // is valid, the plant brakes.
         for process in processes.drain(..).rev() {
@@ -267,11 +264,11 @@ impl Drop for Stage {
     }
 }
 
-/// Engages, and records until the setpoint source, the last of the processes, has ended without error.
+/// Records until the setpoint source, the last of the processes, has ended without error.
 fn watch(
     processes: &mut [ChildProcess],
     recorder: &mut TopicRecorder,
-    mut operator: Operator,
+    mut statuses: Subscriber<StatusMessage>,
     seconds: f64,
     stop: &Stop,
 ) -> Result<(), DemoError> {
@@ -282,17 +279,16 @@ fn watch(
             return Err(DemoError::Interrupted);
         }
         recorder.poll();
-        if let Some(status) = operator.status() {
-            if status.state == State::Fault as u32 {
-                let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-                return Err(DemoError::Failed(format!("fault: {diagnostic}")));
-            }
-            if status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
-                operator.send(Request::Engage)?;
-            }
+        // Before the status, because the setpoint source ends after a fault.
+        let exits: Vec<_> = processes.iter_mut().map(ChildProcess::exit_status).collect::<Result<_, _>>()?;
+        if let Some(status) = statuses.receive_latest()
+            && status.state == State::Fault as u32
+        {
+            let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+            return Err(DemoError::Failed(format!("fault: {diagnostic}")));
         }
-        for process in processes.iter_mut() {
-            match process.exit_status()? {
+        for (process, exit) in processes.iter().zip(exits) {
+            match exit {
                 Some(status) if status.success() && process.name == "move" => {
                     bar.finish_and_clear();
                     return Ok(());

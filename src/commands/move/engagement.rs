@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 
 use super::MoveError;
 use crate::commands::request::carry_out_in_background;
-use hexad_client::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
-use hexad_client::operator::requests::StopBaseline;
+use hexad_client::messages::StatusMessage;
+use hexad_client::operator::connection::Connection;
+use hexad_client::operator::requests::{StopBaseline, post_for_cycle};
 use hexad_client::operator::{OperatorError, Order};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::diagnostic::DiagnosticCode;
-use hexad_core::control::signals::state::{MessageId, Request};
+use hexad_core::control::signals::state::{Request, State};
 use hexad_machine::config::Config;
 
 /// Time between two looks whether a stop came while the request waits here.
@@ -31,13 +32,8 @@ pub enum Engagement {
         stop: Stop,
         result: Option<Outcome>,
     },
-    /// Request in step with the setpoints, in simulated time, which begins with the first wait; `sent` is the last one.
-    InStep {
-        commands: Publisher<CommandMessage>,
-        began_ns: Option<u64>,
-        within: Duration,
-        sent: Option<MessageId>,
-    },
+    /// Request for a cycle in simulated time, which begins with the first wait; `posted` keeps the last one.
+    InStep { machine: String, began_ns: Option<u64>, within: Duration, posted: Option<Connection> },
 }
 
 type Outcome = Receiver<Result<(), OperatorError>>;
@@ -49,9 +45,9 @@ impl Engagement {
         Self::Socket { machine, baseline, checked: now, began: now, within, stop: stop.clone(), result: None }
     }
 
-    /// Request in step with the setpoints.
-    pub fn in_step(bus: &Bus, within: Duration) -> Result<Self, PortError> {
-        Ok(Self::InStep { commands: bus.publisher()?, began_ns: None, within, sent: None })
+    /// Request for the cycle of a setpoint.
+    pub fn in_step(config: &Config, within: Duration) -> Self {
+        Self::InStep { machine: config.name.clone(), began_ns: None, within, posted: None }
     }
 
     /// Control has begun; if it ends, the time in step with the setpoints begins again. A request over the socket that was not
@@ -103,18 +99,13 @@ impl Engagement {
                     Err(TryRecvError::Empty | TryRecvError::Disconnected) => Ok(()),
                 }
             }
-            Self::InStep { commands, sent, .. } => {
-                let refusal = status.request_diagnostic.diagnostic().unwrap_or_default();
-                let is_answer = *sent
-                    == Some(MessageId { epoch: status.request_epoch, sequence: status.request_sequence });
-                if is_answer && refusal.code == DiagnosticCode::InvalidInState {
-                    let state = status.state().unwrap_or_default().name();
-                    let reason = format!("not possible in state {state}");
+            Self::InStep { machine, posted, .. } => {
+                if status.state() == Some(State::Fault) {
+                    let reason = "not possible in state fault; hexad clear first".into();
                     return Err(OperatorError::Refused(Request::Engage, reason).into());
                 }
-                if sent.is_none() || is_answer {
-                    *sent = Some(commands.next_message());
-                    commands.publish(now_ns, Request::Engage.into())?;
+                if status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
+                    *posted = Some(post_for_cycle(machine, Request::Engage, now_ns)?);
                 }
                 Ok(())
             }

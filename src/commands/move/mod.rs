@@ -235,7 +235,7 @@ fn run(
     let bus = config.join()?;
     let engagement = match engage_within {
         None => Engagement::None,
-        Some(within) if bus.is_simulated() => Engagement::in_step(&bus, within)?,
+        Some(within) if bus.is_simulated() => Engagement::in_step(config, within),
         Some(within) => Engagement::over_socket(config, within, stop),
     };
     info!(name = %config.name, seconds = trajectory.duration(), "setpoint source");

@@ -20,7 +20,8 @@ pub(super) struct OpenRequest {
 impl OpenRequest {
     /// The request of a line.
     pub fn of(line: &RequestLine) -> Self {
-        Self { id: line.id, wants_progress: line.progress, is_settled: false }
+        let wants_progress = line.progress || line.cycle_ns.is_some();
+        Self { id: line.id, wants_progress, is_settled: false }
     }
 
     /// The answer, for the client that has sent the request.

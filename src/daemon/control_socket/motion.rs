@@ -227,7 +227,8 @@ impl Server<'_> {
                 Ok(MotionEvent::WantsControl) => {
                     let deadline_ns = self.woke_ns + running.within_ns;
                     let (request, stops_before) = (Request::Engage, running.stops_before);
-                    let order = Order { request, stops_before, waits: true, is_patient: true, deadline_ns };
+                    let (waits, is_patient, cycle_ns) = (true, true, None);
+                    let order = Order { request, stops_before, waits, is_patient, deadline_ns, cycle_ns };
                     let pending = PendingOrder::post(order, snapshot, self.word, (self.clock)());
                     running.engagement = Some(pending);
                 }

@@ -27,6 +27,8 @@ use hexad_core::model::LEGS;
 /// Answers to requests about files and legs.
 const FILE_IN_PROGRESS: &str = "a file for this connection is in progress";
 const OTHER_GEOMETRY: &str = "the daemon runs with another name or other joints than this machine file; hexad reload, or give the daemon's file";
+const NO_CYCLE: &str = "cycle_ns names a cycle in simulated time: only requests to the controller have it, and only of a daemon with \
+    realtime.release = \"lockstep\"; send the request without it";
 const NOT_KEPT: &str =
     "not kept, as this daemon has no state folder (hexad run --state FOLDER) or runs in simulated time";
 
@@ -49,7 +51,11 @@ impl Server<'_> {
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
             return connection.answer(request, answer.clone());
         }
-        let Some(of_controller) = line.controller_request() else {
+        let (of_controller, is_simulated) = (line.controller_request(), self.is_simulated());
+        if line.cycle_ns.is_some() && !line.is_stop() && !(is_simulated && of_controller.is_some()) {
+            return connection.answer(request, AnswerLine::invalid(NO_CYCLE.into()));
+        }
+        let Some(of_controller) = of_controller else {
             return match line.request.as_str() {
                 RELOAD => self.begin_reload(connection, request, line, snapshot),
                 RECORD => self.begin_recording(connection, request, line),
@@ -93,6 +99,7 @@ impl Server<'_> {
             // Until a cycle has read the selected pose.
             is_patient: line.until_ready || line.pose.is_some_and(|number| number > 1),
             deadline_ns: self.woke_ns + within_ns,
+            cycle_ns: line.cycle_ns.filter(|_| self.is_simulated()),
         };
         // What is answered takes no control any more.
         let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.word));
@@ -226,6 +233,10 @@ impl Server<'_> {
         connection.answer(request, answer)
     }
 
+    fn is_simulated(&self) -> bool {
+        self.status.loaded().config.deployment.realtime.is_simulated()
+    }
+
     /// The number of stops so far.
     pub(super) fn stops(&self) -> StopNumber {
         StopNumber { daemon: self.began_us, count: stop_count(self.word, Request::Engage) }
@@ -259,7 +270,8 @@ impl Server<'_> {
             return answer(RequestResult::Refused, DiagnosticCode::MeasurementLost, &text);
         }
         let text = "the daemon was held and the request may be old; send it again";
-        let is_stale = self.woke_ns < self.stale_until_ns;
+        // One that names its cycle is not late for it.
+        let is_stale = self.woke_ns < self.stale_until_ns && line.cycle_ns.is_none();
         is_stale.then(|| answer(RequestResult::Stale, DiagnosticCode::None, text)).flatten()
     }
 }

@@ -7,14 +7,13 @@
 //! time stamps.
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use hexad_core::control::signals::state::MessageId;
 use std::sync::Arc;
 
 use heapless::spsc::Producer;
 
-use self::inputs::{InputFilter, Inputs};
+use self::inputs::Inputs;
 use self::outputs::{OutputSettings, Outputs};
-use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
+use super::cycle::{CycleOutput, IoSide};
 use super::emergency_latch::LatchLink;
 use super::pose_gate::PoseGate;
 use super::reload::io_parameters::{IoParameters, IoParametersInForce};
@@ -25,7 +24,7 @@ use hexad_client::messages::lockstep::poll_until;
 use hexad_client::messages::{Bus, IoCounters, PortError, RejectionCounts, StatisticsMessage};
 use hexad_client::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
 use hexad_client::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
-use hexad_client::realtime::request_word::{self, RequestWord};
+use hexad_client::realtime::request_word::RequestWord;
 use hexad_client::realtime::triple_buffer::{Reader, Writer};
 use hexad_client::realtime::usage::ThreadUsage;
 use hexad_client::realtime::waiter::Waiter;
@@ -107,7 +106,7 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     let at_start = ThreadUsage::of_this_thread();
     let Ports { inputs, outputs } = ports;
     let allocations_at_start = at_start.allocations;
-    let (published, answered_message, snapshot) = (0, MessageId::default(), Snapshot::default());
+    let (published, snapshot) = (0, Snapshot::default());
     // Used in the condition of every wait.
     let progress = links.progress;
     let mut io = IoThread {
@@ -116,7 +115,6 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
         outputs,
         links,
         published,
-        answered_message,
         has_control: false,
         snapshot,
         allocations_at_start,
@@ -145,8 +143,6 @@ struct IoThread<'a> {
     links: IoLinks<'a>,
     /// Number of the last published cycle.
     published: u64,
-    /// The last request that the controller has carried out or refused.
-    answered_message: MessageId,
     /// Whether the platform is under control.
     has_control: bool,
     /// The last snapshot sent to the control thread.
@@ -164,7 +160,7 @@ impl IoThread<'_> {
         while !is_stopped() {
             let release_ns = grid.next_after(monotonic_ns() + lead_ns);
             waiter.until(&mut Monotonic, release_ns - lead_ns);
-            self.inputs.receive(self.input_filter());
+            self.inputs.receive(self.has_control);
             self.hand_over_inputs();
             if timing.spin_ns() == 0 {
                 sleep_until(release_ns);
@@ -185,7 +181,7 @@ impl IoThread<'_> {
         let mut polling = Polling::new(monotonic_ns(), period_ns);
         while !is_stopped() {
             let published = self.published;
-            let is_measured = self.inputs.receive(self.input_filter());
+            let is_measured = self.inputs.receive(self.has_control);
             if is_measured {
                 self.hand_over_inputs();
                 self.links.exchange.event.signal();
@@ -199,7 +195,7 @@ impl IoThread<'_> {
     }
 
     /// Runs a cycle for each measurement, as soon as the setpoint of its instant has arrived, and publishes
-    /// the output before the next measurement is received. A request sent before that setpoint takes effect
+    /// the output before the next measurement is received. A request that is posted before that setpoint takes effect
     /// in the same cycle. The recorder holds the loop when it is behind, so that no cycle is lost.
     fn run_in_lockstep(&mut self, is_stopped: impl Fn() -> bool) {
         let mut answered_ns = None;
@@ -222,7 +218,6 @@ impl IoThread<'_> {
             if setpoint.is_none() {
                 return;
             }
-            self.inputs.receive_requests(|| time_ns, self.input_filter());
             self.hand_over_inputs();
             self.links.exchange.event.signal();
             let before = self.published;
@@ -235,21 +230,6 @@ impl IoThread<'_> {
         }
     }
 
-    fn input_filter(&self) -> InputFilter<'static> {
-        let is_ending = self.links.is_ending.load(Ordering::Relaxed);
-        let word = self.links.word.load();
-        let is_simulated = self.settings.timing.release == ReleaseMode::Lockstep;
-        let word_ns = if is_simulated { 0 } else { request_word::time_ns(word) };
-        InputFilter {
-            has_control: self.has_control,
-            answered_message: self.answered_message,
-            is_ending,
-            requests: self.links.word,
-            word,
-            word_ns,
-        }
-    }
-
     fn hand_over_inputs(&mut self) {
         self.links.exchange.inputs.write(self.inputs.cycle_input());
     }
@@ -257,13 +237,12 @@ impl IoThread<'_> {
     /// Publishes the newest output unless it was published before. Returns its release \[ns\].
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
-        (self.answered_message, self.has_control) = (output.answered_message, output.state.has_control());
+        self.has_control = output.state.has_control();
         self.inputs.set_timeouts(&self.links.parameters.get());
-        if let MessageId { epoch: WORD_EPOCH, sequence: word } = output.answered_message {
-            (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
-            self.links.word.set_seen(word);
-        }
-        if self.links.is_ending.load(Ordering::Relaxed) && !output.state.has_control() {
+        let word = output.answered_message.sequence;
+        (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
+        self.links.word.set_seen(word);
+        if self.links.is_ending.load(Ordering::Relaxed) && !self.has_control {
             self.links.may_end.store(true, Ordering::Relaxed);
         }
         if counters.cycles > self.published {

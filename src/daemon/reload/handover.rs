@@ -15,7 +15,7 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::Loaded;
 use super::io_parameters::{IoParameters, IoParametersInForce};
-use hexad_client::messages::MAX_REQUEST_AGE_NS;
+use hexad_client::operator::protocol::MAX_REQUEST_AGE_NS;
 use hexad_core::control::controller::Controller;
 use hexad_core::control::signals::state::State;
 

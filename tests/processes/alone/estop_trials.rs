@@ -16,7 +16,6 @@ use std::time::{Duration, Instant};
 
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::State;
-use hexad::daemon::cycle::WORD_EPOCH;
 use hexad::messages::ForceMessage;
 use hexad::realtime::request_word;
 use serde::{Deserialize, Serialize};
@@ -45,7 +44,7 @@ const SITUATIONS: u64 = 9;
 const BESIDE_ROOT: [Situation; 7] = [
     Situation::Quiet,
     Situation::Slots,
-    Situation::Messages,
+    Situation::Requests,
     Situation::Connections,
     Situation::Outsiders,
     Situation::Files,
@@ -312,8 +311,7 @@ impl Trial {
         let since = recording.forces.iter().filter(|force| force.header.time_ns > sent_ns);
         let valid =
             since.take_while(|force| force.state != State::Fault as u32).filter(|it| it.valid == 1).count();
-        let posted = recording.statuses.iter().rev().filter(|status| status.request_epoch == WORD_EPOCH);
-        let posted = posted.map(|status| status.request_sequence);
+        let posted = recording.statuses.iter().rev().map(|status| status.request_sequence);
         let posted = posted.map(request_word::time_ns).find(|time_ns| time_ns + 1000 >= sent_ns);
         let found = Self {
             state: before.and_then(|force| State::from_number(force.state)).expect("a state"),

@@ -4,10 +4,9 @@ use std::collections::HashSet;
 use std::thread;
 use std::time::Duration;
 
-use hexad::commands::in_step::Operator;
 use hexad::config::Config;
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::state::{Request, State};
+use hexad::control::signals::state::State;
 use hexad::daemon::report::Report;
 use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
@@ -15,11 +14,13 @@ use hexad::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMess
 use hexad::plant::simulator::Simulator;
 use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
+use serde_json::json;
 
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS, TIMEOUT_NS};
 use crate::support::peer::Controlled;
 use crate::support::recorder::{Recorder, Recording};
+use crate::support::socket::Client;
 use crate::support::steps::{Step, steps};
 use crate::support::trio::{let_pass, start_daemon, valid_after};
 use crate::support::{operator, peer};
@@ -125,6 +126,9 @@ fn every_message_is_counted(recording: &Recording, steps: &[Step]) {
 /// When the clock of the drives began: it has nothing to do with ours.
 const BEGINS_NS: u64 = 7_000_000;
 
+/// Time between two requests \[ns\].
+const ASKING_INTERVAL_NS: u64 = 20_000_000;
+
 /// Cycles under control before the stamps stand still, and for which the driver goes on after it.
 const CYCLES: usize = 1000;
 const CYCLES_AFTER: usize = 1000;
@@ -138,10 +142,11 @@ fn stamps_that_stand_still_end_control() {
     let machine = external("frozen-stamps");
     let daemon = start_daemon(&machine);
     daemon.says("running");
-    let name = machine.name.clone();
+    let (name, client) = (machine.name.clone(), Client::connect(&daemon));
     let config = Config::load(&machine.file).expect("the machine file");
     // In a thread of its own, whose priority ends with it.
-    let valid = thread::spawn(move || drive_with_frozen_stamps(&name, &config)).join().expect("the driver");
+    let valid =
+        thread::spawn(move || drive_with_frozen_stamps(&name, &config, client)).join().expect("the driver");
     println!("{valid} valid forces after the stamps stood still");
     daemon
         .says("fault: time stamps do not advance with the clock: deviation of the clock of the stamps -0.4");
@@ -151,7 +156,7 @@ fn stamps_that_stand_still_end_control() {
 }
 
 /// Number of valid forces after the stamps stood still.
-fn drive_with_frozen_stamps(name: &str, config: &Config) -> usize {
+fn drive_with_frozen_stamps(name: &str, config: &Config, mut operator: Client) -> usize {
     // Or a busy machine makes it late.
     let _ = scheduling::fifo_priority(1);
     let plant = &config.deployment.plant;
@@ -160,10 +165,9 @@ fn drive_with_frozen_stamps(name: &str, config: &Config) -> usize {
     let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
     let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
     let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
-    let mut operator = Operator::new(&bus).expect("to ask");
     let (began_ns, grid) = (monotonic_ns(), Grid::new(PERIOD_NS, 0));
     let (mut tick_ns, mut time_ns, mut force) = (began_ns, BEGINS_NS, None);
-    let (mut under_control, mut after, mut valid_after) = (0, 0, 0);
+    let (mut under_control, mut after, mut valid_after, mut asked_ns) = (0, 0, 0, 0);
     while after < CYCLES_AFTER {
         assert!(monotonic_ns() < began_ns + HANG.as_nanos() as u64, "{under_control} cycles under control");
         let next_ns = grid.next_after(monotonic_ns());
@@ -184,10 +188,11 @@ fn drive_with_frozen_stamps(name: &str, config: &Config) -> usize {
         under_control += usize::from(is_valid);
         valid_after += usize::from(is_valid && after > 0);
         // The host may have held somebody.
-        if after == 0 && message.state == State::Fault as u32 {
-            operator.send(Request::Clear).expect("to send");
-        } else if message.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 {
-            operator.send(Request::Engage).expect("to send");
+        let is_fault = message.state == State::Fault as u32;
+        let is_ready = message.diagnostic_code == DiagnosticCode::ReadyToEngage as u32;
+        if (is_fault && after == 0 || is_ready) && tick_ns > asked_ns + ASKING_INTERVAL_NS {
+            operator.request(if is_fault { "clear" } else { "engage" }, &json!({}));
+            asked_ns = tick_ns;
         }
     }
     valid_after

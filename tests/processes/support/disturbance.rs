@@ -3,13 +3,10 @@
 use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
-
-use hexad::control::signals::state::Request;
-use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, CommandMessage};
 
 use super::background::Background;
 use crate::always_stops::{Hostile, Slots};
@@ -48,8 +45,8 @@ pub enum Situation {
     Quiet,
     /// Every slot of the shared memory is taken.
     Slots,
-    /// Requests without pause on the topic.
-    Messages,
+    /// Four connections of the group that engage without pause.
+    Requests,
     /// 64 connections of the group that stay silent, send halves, send without end.
     Connections,
     /// 64 users outside of the group.
@@ -70,7 +67,7 @@ pub enum Disturbance {
     Slots {
         _slots: Box<Slots>,
     },
-    Messages(Background<u64>),
+    Requests(Background<u64>),
     Connections(Hostile),
     /// A process that says no word unless it gets what it must not.
     Process(Child, BufReader<std::process::ChildStdout>),
@@ -82,7 +79,7 @@ impl Disturbance {
         match situation {
             Situation::Quiet | Situation::Member | Situation::Together => Self::None,
             Situation::Slots => Self::Slots { _slots: Box::new(Slots::fill(machine)) },
-            Situation::Messages => Self::Messages(flood(machine)),
+            Situation::Requests => Self::Requests(flood(socket)),
             Situation::Connections => Self::Connections(Hostile::start(socket, 64)),
             Situation::Outsiders => Self::process(OUTSIDER, socket, "outsider", "64"),
             Situation::Files => Self::process(&["/usr/bin/env"], socket, "pass_files", "16"),
@@ -102,9 +99,9 @@ impl Disturbance {
     pub fn end(self) {
         match self {
             Self::None | Self::Slots { .. } => {}
-            Self::Messages(flood) => {
+            Self::Requests(flood) => {
                 let sent = flood.finish();
-                assert!(sent.iter().all(|sent| *sent > 1000), "{sent:?} requests");
+                assert!(sent.iter().all(|sent| *sent > 100), "{sent:?} requests");
             }
             Self::Connections(hostile) => println!("the connections sent {} bytes", hostile.finish()),
             Self::Process(mut child, mut words) => {
@@ -144,17 +141,19 @@ fn filled(folder: &Path) -> PathBuf {
     path
 }
 
-/// Requests without pause on the topic; the number of those that were sent.
-fn flood(machine: &str) -> Background<u64> {
-    let machine = machine.to_owned();
+/// Requests without pause; the number of those that were answered. So it is under control again as soon as the fault is cleared, and not
+/// before.
+fn flood(socket: &Path) -> Background<u64> {
+    let socket = socket.to_owned();
     Background::start(4, move |_, stop| {
-        let bus = Bus::join(&machine).expect("to join");
-        let mut commands = bus.publisher::<CommandMessage>().expect("to publish");
-        let mut sent = 0;
+        let mut stream = UnixStream::connect(&socket).expect("a connection");
+        let mut answers = BufReader::new(stream.try_clone().expect("the same connection")).lines();
+        let mut answered = 0;
         while !stop.load(Ordering::Relaxed) {
-            // So it is under control again as soon as the fault is cleared, and not before.
-            sent += u64::from(commands.publish(monotonic_ns(), Request::Engage.into()).is_ok());
+            stream.write_all(b"{\"version\": 1, \"request\": \"engage\"}\n").expect("to send");
+            answers.next().expect("an answer").expect("an answer");
+            answered += 1;
         }
-        sent
+        answered
     })
 }

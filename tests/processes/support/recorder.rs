@@ -7,13 +7,9 @@ use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
 use hexad::control::signals::state::State;
-use hexad::daemon::cycle::WORD_EPOCH;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, PortError, RejectionCounts, Subscriber};
-use hexad::messages::{
-    CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SetpointMessage, StatusMessage,
-};
-use hexad::realtime::request_word;
+use hexad::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage};
 use hexad::realtime::setup::scheduling;
 
 use super::children::HANG;
@@ -33,8 +29,8 @@ pub struct Recording {
     pub measured: Vec<MeasuredMessage>,
     pub forces: Vec<ForceMessage>,
     pub statuses: Vec<StatusMessage>,
-    /// Of every operator: of the topic, and as the status answers them of the control socket and of signals.
-    pub commands: Vec<CommandMessage>,
+    /// Request words of every operator, as the status answers them.
+    pub requests: Vec<u64>,
     /// Forces that were said and are not here.
     pub passed_over: RejectionCounts,
 }
@@ -110,7 +106,7 @@ impl Recorder {
         self.recording.lock().expect("no panic while it was held")
     }
 
-    /// Everything so far. What is older than a second or two is forgotten then, but for the commands.
+    /// Everything so far. What is older than a second or two is forgotten then, but for the requests.
     pub fn cut(&self) -> Recording {
         let mut recording = self.so_far();
         let all = recording.clone();
@@ -157,44 +153,28 @@ struct Listener {
     measured: Subscriber<MeasuredMessage>,
     forces: Subscriber<ForceMessage>,
     statuses: Subscriber<StatusMessage>,
-    commands: Subscriber<CommandMessage>,
-    /// The last request that did not come by the topic.
     word: u64,
 }
 
 impl Listener {
     fn new(bus: &Bus) -> Self {
-        Self {
-            setpoints: sink(bus),
-            measured: sink(bus),
-            forces: sink(bus),
-            statuses: sink(bus),
-            commands: sink(bus),
-            word: 0,
-        }
+        Self { setpoints: sink(bus), measured: sink(bus), forces: sink(bus), statuses: sink(bus), word: 0 }
     }
 
     fn take(&mut self, recording: &mut Recording) {
         // Answers before questions: what a force was computed from is then in the recording with it.
         while let Some(status) = self.statuses.receive() {
-            if status.request_epoch == WORD_EPOCH && status.request_sequence != self.word {
+            if status.request_sequence != self.word {
                 self.word = status.request_sequence;
-                recording.commands.push(command_of(self.word));
+                recording.requests.push(self.word);
             }
             recording.statuses.push(status);
         }
         recording.forces.extend(std::iter::from_fn(|| self.forces.receive()));
         recording.measured.extend(std::iter::from_fn(|| self.measured.receive()));
         recording.setpoints.extend(std::iter::from_fn(|| self.setpoints.receive()));
-        recording.commands.extend(std::iter::from_fn(|| self.commands.receive_from_any()));
         recording.passed_over = self.forces.rejections();
     }
-}
-
-/// A request of the control socket or of a signal, as a message.
-fn command_of(word: u64) -> CommandMessage {
-    let header = Header { time_ns: request_word::time_ns(word), ..Header::default() };
-    CommandMessage { header, request: request_word::number(word), reserved: 0 }
 }
 
 fn forget<T: Message>(messages: &mut Vec<T>, until_ns: u64) {

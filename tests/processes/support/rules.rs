@@ -6,6 +6,7 @@ use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::SetpointKind;
 use hexad::control::signals::state::{Request, State};
 use hexad::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage};
+use hexad::realtime::request_word;
 use hexad_support::not_run::not_run;
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
@@ -123,9 +124,9 @@ fn forces_keep_their_limits(forces: &[ForceMessage]) {
 /// has asked to clear it, and then engaging is to be asked for anew.
 fn nothing_moves_unasked(recording: &Recording) {
     let asked = |is_it: fn(Request) -> bool, from_ns: u64, until_ns: u64| {
-        let commands = recording.commands.iter();
-        let commands = commands.filter(|command| Request::from_number(command.request).is_some_and(is_it));
-        commands.map(|command| command.header.time_ns).find(|time_ns| (from_ns..=until_ns).contains(time_ns))
+        let words = recording.requests.iter().copied();
+        let words = words.filter(|word| Request::from_number(request_word::number(*word)).is_some_and(is_it));
+        words.map(request_word::time_ns).find(|time_ns| (from_ns..=until_ns).contains(time_ns))
     };
     let engaged = |from_ns, until_ns| asked(Request::can_begin_control, from_ns, until_ns).is_some();
     for life in recording.forces.chunk_by(|a, b| a.header.epoch == b.header.epoch) {

@@ -15,12 +15,11 @@ from .client import Client, HexadError, Result, Role, judge, monotonic_ns, reque
 from .driver import Driver, sleep_until
 from .frames import Frames, motion_of, setpoint_of
 from .machine import Machine
-from .messages import Command, Force, Measured, Setpoint, Statistics, Status
+from .messages import Force, Measured, Setpoint, Statistics, Status
 from .motion import Motion
 
 __all__ = [
     "Client",
-    "Command",
     "Driver",
     "Force",
     "Frames",

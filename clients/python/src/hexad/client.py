@@ -124,9 +124,12 @@ class Client:
         """Publishes a setpoint for an instant [ns]."""
         _checked(_LIBRARY.hexad_publish_setpoint(self._handle, time_ns, setpoint))
 
-    def publish_request(self, time_ns: int, number: int) -> None:
-        """Publishes a request (`messages.REQUEST_...`) in step with the setpoints."""
-        _checked(_LIBRARY.hexad_publish_request(self._handle, time_ns, number))
+    def request_in_cycle(self, cycle_ns: int, number: int) -> None:
+        """Sends a request (`messages.REQUEST_...`) for a cycle in simulated time: call it before `publish_setpoint` with the same time.
+
+        The status of that cycle shows whether the request was refused. In real time use `request`.
+        """
+        _checked(_LIBRARY.hexad_request_in_cycle(self._handle, cycle_ns, number))
 
     def latest_status(self) -> Status | None:
         """The newest status; None before the first. The next call overwrites it."""

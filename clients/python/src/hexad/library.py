@@ -18,7 +18,7 @@ _FUNCTIONS = {
     "hexad_latest_force": [c_void_p, c_uint64, POINTER(Force)],
     "hexad_judge_force": [POINTER(Force), c_uint64, c_uint64],
     "hexad_publish_setpoint": [c_void_p, c_uint64, POINTER(Setpoint)],
-    "hexad_publish_request": [c_void_p, c_uint64, c_uint32],
+    "hexad_request_in_cycle": [c_void_p, c_uint64, c_uint32],
     "hexad_latest_status": [c_void_p, POINTER(Status)],
     "hexad_latest_statistics": [c_void_p, POINTER(Statistics)],
     "hexad_latest_measured": [c_void_p, POINTER(Measured)],

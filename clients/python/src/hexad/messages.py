@@ -161,22 +161,6 @@ class Measured(Message):
         return "hexad_measured"
 
 
-class Command(Message):
-    """Request of a program that sends it in step with its setpoints, one per message. Operators use the control socket."""
-
-    topic = "command"
-    schema = 5
-    _fields_ = [
-        ("header", Header),  # Schema version, publisher, sequence number and time stamp.
-        ("request", c_uint32),  # Number of the `Request`.
-        ("reserved", c_uint32),  # Zero.
-    ]
-
-    @staticmethod
-    def type_name():
-        return "hexad_command"
-
-
 class Force(Message):
     """Actuator forces of one cycle. A driver brakes at a message that is not `valid`, and when its own watchdog has seen no applicable message for too long. A message is applicable only if schema and checksum are right, the sequence number increases and `time_ns` is neither in the future nor too old."""
 
@@ -270,8 +254,8 @@ class Status(Message):
         ("state", c_uint32),  # Number of the `State`.
         ("active_limits", c_uint32),  # Bits of the `Limit`s that this cycle has reached, or nearly.
         ("diagnostic", Diagnostic),  # Why the state is not active, or soon will not be.
-        ("request_epoch", c_uint64),  # Epoch of the last command message that was carried out or refused; the largest number for a request over the control socket or by a signal.
-        ("request_sequence", c_uint64),  # Sequence number of that message; a number that identifies the other requests.
+        ("request_epoch", c_uint64),  # The largest number once a request was carried out or refused.
+        ("request_sequence", c_uint64),  # Number that identifies that request.
         ("request_diagnostic", Diagnostic),  # Why that request was refused; code 0 if it was carried out.
         ("pose_valid", c_uint32),  # 1 if the fields from `x` to `time_to_singularity_s` are valid.
         ("error_valid", c_uint32),  # 1 if `position_error_m` and `orientation_error_rad` are valid.

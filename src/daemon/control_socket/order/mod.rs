@@ -5,14 +5,15 @@ use nalgebra::Vector3;
 use crate::control_socket::answer::answer_line;
 use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
-use hexad_client::messages::MAX_REQUEST_AGE_NS;
-use hexad_client::operator::protocol::{AnswerLine, RequestResult, STOPPED, is_stop};
+use hexad_client::operator::protocol::{AnswerLine, MAX_REQUEST_AGE_NS, RequestResult, STOPPED, is_stop};
 use hexad_client::realtime::request_word::RequestWord;
 use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::state::{Request, State};
 
 /// Why a request has ended.
 pub const REPLACED: &str = "a later request has replaced it";
+/// Why a request of a cycle is not posted. Nothing can wait for it: the cycle waits for a setpoint, which waits for the request.
+const NOT_POSTED: &str = "a stop, or another request of higher precedence, is about to be obeyed";
 
 /// Interval between two attempts of a request that waits until it is possible \[ns\].
 const RETRY_INTERVAL_NS: u64 = 100_000_000;
@@ -37,6 +38,8 @@ pub struct Order {
     pub is_patient: bool,
     /// Instant at which all waiting ends \[ns\].
     pub deadline_ns: u64,
+    /// Instant of the cycle that it names, in simulated time \[ns\].
+    pub cycle_ns: Option<u64>,
 }
 
 /// An order in progress.
@@ -48,6 +51,8 @@ pub struct PendingOrder {
     since_ns: u64,
     /// The last diagnostic sent to the client.
     reported: DiagnosticCode,
+    /// The cycle that the client does not know to be posted yet.
+    unreported_cycle_ns: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,8 +83,9 @@ pub enum Step {
 impl PendingOrder {
     /// Creates an order and posts it at once, unless a request of higher precedence is pending.
     pub fn post(order: Order, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Self {
-        let reported = DiagnosticCode::None;
-        let mut pending = Self { order, stage: Stage::Posting, since_ns: now_ns, reported };
+        let (reported, unreported_cycle_ns) = (DiagnosticCode::None, order.cycle_ns);
+        let stage = Stage::Posting;
+        let mut pending = Self { order, stage, since_ns: now_ns, reported, unreported_cycle_ns };
         pending.try_post(snapshot, word, now_ns);
         pending
     }
@@ -92,6 +98,19 @@ impl PendingOrder {
     /// Checks the newest cycle.
     pub fn step(&mut self, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Step {
         let age_ns = now_ns.saturating_sub(self.since_ns);
+        let is_late = match self.order.cycle_ns {
+            Some(_) => now_ns > self.order.deadline_ns,
+            None => age_ns > ANSWER_LIMIT_NS,
+        };
+        if let Some(cycle_ns) = self.unreported_cycle_ns.take() {
+            return match self.stage {
+                Stage::Posting => self.answer(RequestResult::Superseded, snapshot, NOT_POSTED.into()),
+                _ => {
+                    let text = format!("posted for the cycle at {cycle_ns} ns");
+                    Step::Progress(self.line(RequestResult::Waiting, snapshot, diagnostic(snapshot), text))
+                }
+            };
+        }
         match self.stage {
             Stage::Posting if age_ns > ANSWER_LIMIT_NS && !self.order.is_patient => {
                 return self.unanswered(snapshot);
@@ -111,7 +130,7 @@ impl PendingOrder {
                 let text = if self.is_overruled(word) { STOPPED } else { REPLACED };
                 return self.answer(RequestResult::Superseded, snapshot, text.into());
             }
-            Stage::Posted(posted) if age_ns > ANSWER_LIMIT_NS => {
+            Stage::Posted(posted) if is_late => {
                 self.cancel_posted(posted, word);
                 return self.unanswered(snapshot);
             }
@@ -134,12 +153,13 @@ impl PendingOrder {
         self.line(RequestResult::Superseded, snapshot, diagnostic(snapshot), REPLACED.into())
     }
 
-    /// Tries to post the request. Before the first cycle is published, no request for control is posted.
+    /// Tries to post the request. Before the first cycle is published, no request for control is posted that names none.
     fn try_post(&mut self, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) {
-        if snapshot.time_ns == 0 && self.order.request.can_begin_control() {
+        let Order { request, cycle_ns, .. } = self.order;
+        if snapshot.time_ns == 0 && cycle_ns.is_none() && request.can_begin_control() {
             return;
         }
-        let posted = word.post_unless(self.order.request as u32, now_ns, || self.is_overruled(word));
+        let posted = word.post_unless(request as u32, now_ns, cycle_ns, || self.is_overruled(word));
         if let Some(posted) = posted {
             (self.stage, self.since_ns) = (Stage::Posted(posted), now_ns);
         }
@@ -174,7 +194,8 @@ impl PendingOrder {
         let text = refusal_text(snapshot);
         // A fault ends only by an operator, so waiting does not help.
         if self.order.is_patient && may_resolve(refusal.code) && state(snapshot) != State::Fault {
-            (self.stage, self.since_ns) = (Stage::Retrying, now_ns);
+            // The cycle that it named has passed.
+            (self.stage, self.since_ns, self.order.cycle_ns) = (Stage::Retrying, now_ns, None);
             if self.reported == refusal.code || now_ns > self.order.deadline_ns {
                 return self.check_deadline(snapshot, now_ns);
             }

@@ -2,6 +2,44 @@
 
 use super::*;
 
+/// An order for a cycle, with its first answer.
+fn post_for_cycle(request: Request, word: &RequestWord, deadline_ns: u64) -> (PendingOrder, RequestResult) {
+    let (stops_before, cycle_ns) = (stop_count(word, request), Some(7_000_000));
+    let order = Order { request, stops_before, waits: false, is_patient: false, deadline_ns, cycle_ns };
+    let mut pending = PendingOrder::post(order, &Snapshot::default(), word, 1000);
+    let first = pending.step(&Snapshot::default(), word, 1000);
+    (pending, result(&first).unwrap())
+}
+
+/// However long it takes until its cycle, also the first of all.
+#[test]
+fn a_request_for_a_cycle_waits_for_it_and_is_withdrawn_at_its_deadline_or_with_its_client() {
+    for request in Request::ALL {
+        let deadline_ns = 100 * ANSWER_LIMIT_NS;
+        let word = RequestWord::default();
+        let (mut pending, first) = post_for_cycle(request, &word, deadline_ns);
+        assert_eq!((first, word.load() != 0), (RequestResult::Waiting, true), "{request:?}");
+        let waits = snapshot(State::Active, 0, Diagnostic::default());
+        assert_eq!(result(&pending.step(&waits, &word, deadline_ns)), None);
+        assert_eq!(result(&pending.step(&waits, &word, deadline_ns + 1)), Some(RequestResult::Unanswered));
+        assert_eq!(word.load() != 0, is_stop(request), "{request:?}");
+        let word = RequestWord::default();
+        post_for_cycle(request, &word, deadline_ns).0.cancel(&word);
+        assert_eq!(word.load() != 0, is_stop(request), "{request:?}");
+    }
+}
+
+/// The stop waits for a cycle, and the cycle for the setpoint of a source that waits for this answer.
+#[test]
+fn a_request_for_a_cycle_does_not_wait_for_a_stop() {
+    let word = RequestWord::default();
+    let stop = word.post(Request::Stop as u32, 0);
+    let (_, first) = post_for_cycle(Request::Engage, &word, u64::MAX);
+    assert_eq!((first, Some(word.load())), (RequestResult::Superseded, stop));
+    let (_, first) = post_for_cycle(Request::Estop, &word, u64::MAX);
+    assert_eq!((first, word.load() != stop.unwrap()), (RequestResult::Waiting, true));
+}
+
 /// An order that is asked for now.
 fn post(
     request: Request,
@@ -11,7 +49,8 @@ fn post(
     now_ns: u64,
 ) -> PendingOrder {
     let stops_before = stop_count(word, request);
-    let order = Order { request, stops_before, waits: true, is_patient, deadline_ns: u64::MAX };
+    let (waits, deadline_ns, cycle_ns) = (true, u64::MAX, None);
+    let order = Order { request, stops_before, waits, is_patient, deadline_ns, cycle_ns };
     PendingOrder::post(order, snapshot, word, now_ns)
 }
 
