@@ -305,6 +305,8 @@ fn in_lock_step_the_forces_are_the_same_bytes_without_optimization() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("unoptimized");
     let mut cargo = Command::new(env!("CARGO"));
     cargo.current_dir(env!("CARGO_MANIFEST_DIR")).env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
+    // With them the threads have the stack that such code needs.
+    cargo.env("CARGO_PROFILE_DEV_DEBUG_ASSERTIONS", "true");
     cargo.args(["build", "--bin", "hexad", "--target-dir"]).arg(&folder);
     assert!(cargo.status().expect("cargo").success());
     assert_same_as(folder.join("debug/hexad"), "without optimization");

@@ -1,8 +1,9 @@
 //! Lines of the control socket: one JSON object per line, in both directions. `docs/operator.md` describes them.
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
-use super::motion_fields::{FrameField, RateFields, TargetFields};
+use super::motion_fields::{FrameField, GOTO, HOLD, JOG, RateFields, TargetFields};
 use super::ride::RidePhase;
 use super::status_report::{StatusReport, StopNumber, is_false};
 use hexad_core::control::signals::state::Request;
@@ -24,6 +25,27 @@ const DEFAULT_WITHIN_S: f64 = 30.0;
 
 /// Name of the request that keeps which legs were seen to move.
 pub const CONFIRM_LEGS: &str = "confirm_legs";
+
+/// Requests of each field that not all have.
+const OWN_FIELDS: [(&str, &[&str]); 17] = [
+    ("pose", &["engage"]),
+    ("last_s", &["record"]),
+    ("input", &["status"]),
+    ("ride", &["status"]),
+    ("yes", &["ride_start"]),
+    ("engage", &[GOTO, HOLD]),
+    ("tool", &[GOTO, JOG]),
+    ("work", &[GOTO, JOG]),
+    ("rotation", &[GOTO, JOG]),
+    ("target", &[GOTO]),
+    ("relative", &[GOTO]),
+    ("home", &[GOTO]),
+    ("speed", &[GOTO]),
+    ("tolerance_m", &[GOTO]),
+    ("rate", &[JOG]),
+    ("geometry_sha1", &[CONFIRM_LEGS]),
+    ("legs", &[CONFIRM_LEGS]),
+];
 
 /// Line of a client.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -128,9 +150,10 @@ impl RequestLine {
     /// Reads a line. A stop is obeyed in any version of the line, whatever else is in it. The error comes with the number for its answer.
     pub fn parse(line: &str) -> Result<Self, (Option<u64>, String)> {
         let parsed = serde_json::from_str(line).map_err(|error| format!("no request: {error}"));
-        let parsed = parsed.and_then(|line: Self| match line.version {
-            VERSION => Ok(line),
-            other => Err(format!("version {other} of the protocol; this daemon has version {VERSION}")),
+        let parsed = parsed.and_then(|it: Self| match (it.version, foreign_field(line, &it.request)) {
+            (VERSION, None) => Ok(it),
+            (VERSION, Some(field)) => Err(format!("{field}: is no field of {}; leave it out", it.request)),
+            (other, _) => Err(format!("version {other} of the protocol; this daemon has version {VERSION}")),
         });
         parsed.or_else(|reason| {
             let Known { request, id } = serde_json::from_str(line).unwrap_or_default();
@@ -148,6 +171,18 @@ impl RequestLine {
     pub fn is_stop(&self) -> bool {
         self.controller_request().is_some_and(is_stop)
     }
+}
+
+/// A field that the request of a line does not use, although its sender expects an effect.
+fn foreign_field(line: &str, request: &str) -> Option<&'static str> {
+    let given: Map<String, Value> = serde_json::from_str(line).unwrap_or_default();
+    let is_given = |field: &str| {
+        given.get(field).is_some_and(|value| !matches!(value, Value::Null | Value::Bool(false)))
+    };
+    OWN_FIELDS
+        .iter()
+        .find(|(field, owners)| !owners.contains(&request) && is_given(field))
+        .map(|(field, _)| *field)
 }
 
 /// Part of a line of another version, or with mistakes.

@@ -68,7 +68,6 @@ impl MotionOrder {
 
     /// The motion of a line, with the frames and limits of a configuration.
     pub fn of_line(line: &RequestLine, config: &Config) -> Result<Self, String> {
-        refuse_fields_of_others(line)?;
         let motion = match line.request.as_str() {
             GOTO => Motion::Goto(goto(line)?),
             JOG => Motion::Jog(rates(line.rate, &config.deployment.limits.in_force())?),
@@ -77,27 +76,6 @@ impl MotionOrder {
         let (coordinates, is_straight) = (coordinates(line, config)?, line.tool.is_some());
         Ok(Self { motion, coordinates, is_straight, may_engage: line.engage })
     }
-}
-
-/// Refuses a field that the request does not use, because its sender expects an effect.
-fn refuse_fields_of_others(line: &RequestLine) -> Result<(), String> {
-    let of_goto = [
-        ("target", line.target.is_some()),
-        ("relative", line.relative),
-        ("home", line.home),
-        ("speed", line.speed.is_some()),
-        ("tolerance_m", line.tolerance_m.is_some()),
-    ];
-    let of_coordinates =
-        [("tool", line.tool.is_some()), ("work", line.work.is_some()), ("rotation", line.rotation.is_some())];
-    let request = line.request.as_str();
-    let foreign = of_goto.into_iter().filter(|_| request != GOTO);
-    let foreign = foreign.chain(of_coordinates.into_iter().filter(|_| request == HOLD));
-    let others = [("rate", line.rate.is_some() && request != JOG), ("engage", line.engage && request == JOG)];
-    let mut foreign = foreign.chain(others);
-    foreign
-        .find(|(_, is_given)| *is_given)
-        .map_or(Ok(()), |(field, _)| Err(format!("{field}: is no field of {request}; leave it out")))
 }
 
 fn goto(line: &RequestLine) -> Result<GotoOrder, String> {

@@ -106,6 +106,8 @@ fn a_bad_request_is_refused_with_its_field() {
         ("jog", json!({"rate": {"x_m_s": 0.3}}), "norm of x, y, z = 0.3 m/s: must be at most 0.2"),
         ("jog", json!({"rate": {}, "engage": true}), "engage: is no field of jog"),
         ("hold", json!({"target": {"x_m": 1}}), "target: is no field of hold"),
+        ("engage", json!({"speed": 0.1}), "speed: is no field of engage"),
+        ("clear", json!({"pose": 2}), "pose: is no field of clear"),
     ] {
         let text = panel.does(request, &more, "invalid");
         assert!(text.contains(words), "{words:?} must be in {text}");
