@@ -24,12 +24,16 @@ use hexad_core::model::machine::{Machine, Platform};
 use hexad_core::model::regressor::InertialParameters;
 
 mod equations;
+mod examination;
 mod fit;
+mod hypotheses;
 mod least_squares;
 mod parameters;
 pub mod samples;
 
 pub use self::equations::Load;
+pub use self::examination::{Examination, Finding};
+pub use self::hypotheses::Cause;
 pub use self::samples::{MotionSample, samples};
 
 /// Samples of one recording, and what was on the platform.
@@ -62,6 +66,8 @@ pub struct Identification {
     /// the parameters of the [regressor](hexad_core::model::regressor), then six force scales, six products of force scale and load friction, and the
     /// parameters of the payload. `None` without a known weight, or if the equations do not determine them.
     pub base_parameters: Option<Vec<(usize, f64)>>,
+    /// Whether a known weight shows the mean of the force scales, or the machine is held.
+    is_scale_known: bool,
     parameters: Parameters,
     fit: Fit,
 }
@@ -101,6 +107,7 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
         residual,
         correlation,
         base_parameters: least_squares(file, &all).filter(|_| has_known_weight),
+        is_scale_known,
         parameters,
         fit,
     })
@@ -121,6 +128,14 @@ pub fn expected_deviations(file: &Machine) -> InertialParameters {
 }
 
 impl Identification {
+    /// Tests whether the model explains the runs that were identified, and widens the deviations by what it lacks and by the deviation
+    /// of the delay with which their samples were made. `None` if a pose is singular.
+    pub fn examine(&mut self, runs: &[Run], delay_deviation_s: f64) -> Option<Examination> {
+        let Self { machine, parameters, fit, is_scale_known, .. } = self;
+        let runs: Vec<_> = runs.iter().map(|run| (run, equations(machine, &run.samples, &run.load))).collect();
+        examination::examine((machine, parameters, fit), &runs, *is_scale_known, delay_deviation_s)
+    }
+
     /// A quantity of machine and payload with its deviation.
     pub fn estimate(&self, quantity: impl Fn(&Machine, &Platform) -> f64) -> Estimated {
         let Self { parameters, fit: Fit { free, covariance, .. }, .. } = self;
