@@ -1,7 +1,8 @@
 //! Identification in worlds that the model lacks: either the stated deviations cover the errors, or the test of the residuals fails and
 //! names the cause among its first two.
 
-use hexad::analysis::drive_delay::RecordedStretch;
+use hexad::analysis::drive_delay::{Estimate, RecordedStretch, drive_delay};
+use hexad::analysis::identification::{Cause, Examination, Load, Run, identify, samples};
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::control::signals::state::State;
@@ -15,13 +16,16 @@ use hexad::model::task::TaskState;
 use hexad::model::transmission::Transmission;
 use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
 use nalgebra::{Rotation3, Vector3};
+use rayon::prelude::*;
 
-use hexad_support::identified::loaded;
+use hexad_support::certificate::Certificate;
+use hexad_support::edited::configured;
+use hexad_support::identified::{drawn, errors, loaded};
 use hexad_support::rig::{Rig, SENDING, record};
 
 /// What the model lacks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum World {
+enum World {
     Exact,
     /// Gravity is so many degrees off.
     Gravity(f64),
@@ -42,7 +46,7 @@ pub(super) enum World {
 }
 
 /// Plays a motion on a platform in a world.
-pub(super) fn played_in(
+fn played_in(
     world: World,
     config: &Config,
     truth: &Machine,
@@ -69,7 +73,8 @@ pub(super) fn played_in(
         }
         _ => {}
     }
-    let (mut rig, mut stretch) = (Rig::imperfect(config, &platform, &imperfections), RecordedStretch::default());
+    let (mut rig, mut stretch) =
+        (Rig::imperfect(config, &platform, &imperfections), RecordedStretch::default());
     let (leg, mut played_length) = ((seed % 6) as usize, None::<[f64; 6]>);
     while rig.time_s() < 1.0 + motion.duration() {
         let t = rig.time_s() - 1.0;
@@ -81,7 +86,9 @@ pub(super) fn played_in(
             World::Backlash(play) => {
                 let half = 0.5 * play;
                 let last = played_length.get_or_insert(*length);
-                last.iter_mut().zip(&*length).for_each(|(last, now)| *last = last.clamp(now - half, now + half));
+                last.iter_mut()
+                    .zip(&*length)
+                    .for_each(|(last, now)| *last = last.clamp(now - half, now + half));
                 *length = *last;
             }
             World::Jitter(most) => {
@@ -121,8 +128,7 @@ fn alter(world: World, truth: &Machine, stretch: &mut RecordedStretch) {
             }
             World::LoosePayload(share) => {
                 let mass = share * truth.platform.mass;
-                let proper = motion.pose.rotation.transpose()
-                    * (motion.acceleration.linear - truth.gravity);
+                let proper = motion.pose.rotation.transpose() * (motion.acceleration.linear - truth.gravity);
                 // It sticks up to a slope of 5 %, and slides slowly to its stop beyond.
                 for axis in 0..2 {
                     if proper[axis].abs() > 0.05 * proper.z {
@@ -139,95 +145,87 @@ fn alter(world: World, truth: &Machine, stretch: &mut RecordedStretch) {
     }
 }
 
-#[test]
-#[ignore = "dump"]
-fn dump() {
-    use hexad::analysis::drive_delay::drive_delay;
-    use hexad::analysis::identification::{Load, Run, identify, samples};
-    use hexad_support::edited::configured;
-    use hexad_support::identified::drawn;
-    use rayon::prelude::*;
-    use std::io::Write;
-    let mut config = configured("motion_base", "[limits]\npayload_change_kg = inf\n");
-    println!("{:?}", config.deployment.plant);
-    config.deployment.plant.step_s = 5e-4;
+/// Identifies a machine in a world as `hexad identify` does. Values, those beyond three of their deviations, and the examination.
+fn identified_in(world: World, config: &Config, seed: u64) -> (usize, usize, Examination) {
     let file = &config.machine;
-    let list = std::env::var("WORLDS").unwrap();
-    let folder = std::env::var("DUMP").unwrap();
-    let periods: u32 = std::env::var("PERIODS").map_or(6, |x| x.parse().unwrap());
-    let cases: Vec<(String, World, f64, u64)> = list
-        .split_whitespace()
-        .flat_map(|word| {
-            let parts: Vec<_> = word.split(':').map(str::to_owned).collect();
-            let size: f64 = parts[1].parse().unwrap();
-            let world = match parts[0].as_str() {
-                "exact" => World::Exact,
-                "gravity" => World::Gravity(size),
-                "joints" => World::Joints(size),
-                "backlash" => World::Backlash(size),
-                "stiction" => World::Stiction(size),
-                "base" => World::ElasticBase(size),
-                "payload" => World::LoosePayload(size),
-                "jitter" => World::Jitter(size),
-                "scale" => World::SensorScale(size),
-                other => panic!("{other}"),
-            };
-            let amplitude: f64 = parts[2].parse().unwrap();
-            let n: u64 = parts[3].parse().unwrap();
-            let name = word.replace(':', "_");
-            (0..n).map(move |k| (name.clone(), world, amplitude, 1000 + k))
+    let amplitude = if matches!(world, World::Stiction(_)) { 0.1 } else { 0.7 };
+    let excitation =
+        Trajectory::Excitation(Box::new(Trajectory::excitation(config, 6, amplitude, 1).unwrap()));
+    let truth = drawn(file, &mut Random::new(seed));
+    let (mass, at) = (0.15 * file.platform.mass, [0.3, -0.2, 0.8]);
+    let [empty, heavy] = [truth.clone(), loaded(&truth, mass, Vector3::from(at))]
+        .map(|platform| played_in(world, config, &platform, &excitation, seed));
+    let runs = |delay_s: f64| {
+        [(&empty, Load::Empty), (&heavy, Load::Known { mass, at })]
+            .map(|(stretch, load)| Run { samples: samples(stretch, delay_s), load })
+    };
+    let first = identify(file, &runs(SENDING / 1000.0), false).unwrap();
+    let mut forces = empty.clone();
+    for sent in &mut forces.sent {
+        sent.force
+            .iter_mut()
+            .zip(first.machine.actuator.force_scale)
+            .for_each(|(force, scale)| *force *= scale);
+    }
+    // A delay that the motion does not show is the file's, as in the command.
+    let delay = drive_delay(&first.machine, &[forces]).map(|found| found.mean);
+    let of_file = Estimate { delay_s: SENDING / 1000.0, deviation_s: 0.5 * SENDING / 1000.0 };
+    let delay = delay.filter(|delay| 2.0 * delay.deviation_s <= 5e-4).unwrap_or(of_file);
+    let runs = runs(delay.delay_s);
+    let mut found = identify(file, &runs, false).unwrap();
+    let examination = found.examine(&runs, delay.deviation_s).unwrap();
+    let errors = errors(&found, &truth);
+    (errors.len(), errors.iter().filter(|error| !(error.abs() <= 3.0)).count(), examination)
+}
+
+#[test]
+#[ignore = "second tier: takes long"]
+fn certificate_what_the_model_lacks_is_covered_or_named() {
+    let mut config = configured(
+        "motion_base",
+        "[limits]\npayload_change_kg = inf\n[control]\nengage_position_m = 0.01\nengage_orientation_rad = 0.02\n",
+    );
+    // Drives are rigid: half as many steps do.
+    config.deployment.plant.step_s = 5e-4;
+    let worlds = [
+        (World::Gravity(1.0), Some(Cause::Gravity)),
+        (World::Joints(1e-3), Some(Cause::Joints)),
+        (World::Backlash(1e-4), Some(Cause::Play)),
+        (World::Stiction(0.002), Some(Cause::Stiction)),
+        (World::ElasticBase(0.01), Some(Cause::Elasticity)),
+        (World::LoosePayload(0.05), Some(Cause::LoosePayload)),
+        (World::Jitter(0.8), None),
+        (World::SensorScale(2e-4), Some(Cause::LengthSensor)),
+        (World::Exact, None),
+    ];
+    let certificate = Certificate::new("identification in worlds that the model lacks", 9, 225);
+    let (seed, count) = (certificate.seed(), worlds.len() as u64);
+    let trials: Vec<_> = (0..certificate.total())
+        .into_par_iter()
+        .map(|trial| {
+            let (world, cause) = worlds[(trial % count) as usize];
+            let (values, beyond, examination) = identified_in(world, &config, seed + trial / count);
+            let named: Vec<_> = examination.findings.iter().take(2).map(|finding| finding.cause).collect();
+            println!(
+                "{world:?}: {beyond} of {values} beyond three deviations; holds: {}, {named:?}",
+                examination.holds()
+            );
+            certificate.advance(1);
+            (world, values, beyond, !examination.holds() && cause.is_none_or(|cause| named.contains(&cause)))
         })
         .collect();
-    cases.into_par_iter().for_each(|(name, world, amplitude, seed)| {
-        let path = format!("{folder}/{name}_{seed}");
-        if std::path::Path::new(&path).exists() {
-            return;
-        }
-        let began = std::time::Instant::now();
-        let excitation =
-            Trajectory::Excitation(Box::new(Trajectory::excitation(&config, periods, amplitude, 1).unwrap()));
-        let truth = drawn(file, &mut Random::new(seed));
-        let (mass, at) = (0.15 * file.platform.mass, [0.3, -0.2, 0.8]);
-        let with_weight = loaded(&truth, mass, Vector3::from(at));
-        let [empty, heavy] =
-            [&truth, &with_weight].map(|platform| played_in(world, &config, platform, &excitation, seed));
-        let played = began.elapsed();
-        let runs = |delay: f64| {
-            [
-                Run { samples: samples(&empty, delay), load: Load::Empty },
-                Run { samples: samples(&heavy, delay), load: Load::Known { mass, at } },
-            ]
-        };
-        let first = identify(file, &runs(SENDING / 1000.0), false).unwrap();
-        let mut forces = empty.clone();
-        for sent in &mut forces.sent {
-            sent.force.iter_mut().zip(first.machine.actuator.force_scale).for_each(|(f, s)| *f *= s);
-        }
-        let mut delay = drive_delay(&first.machine, &[forces]).unwrap().mean;
-        println!("{path} {delay:?}");
-        if 2.0 * delay.deviation_s > 5e-4_f64.max(0.1 * delay.delay_s) {
-            delay = hexad::analysis::drive_delay::Estimate { delay_s: SENDING / 1000.0, deviation_s: 0.5 * SENDING / 1000.0 };
-        }
-        let runs = runs(delay.delay_s);
-        let a = &truth.actuator;
-        let p = &truth.platform;
-        let mut numbers = vec![delay.delay_s, delay.deviation_s, p.mass, truth.rod.mass, a.reflected_mass];
-        numbers.extend(p.center_of_mass.iter().chain(p.inertia.iter()));
-        for values in [a.viscous_friction, a.coulomb_friction, a.load_friction, a.force_scale] {
-            numbers.extend(values);
-        }
-        for run in &runs {
-            numbers.push(run.samples.len() as f64);
-            for s in &run.samples {
-                numbers.push(s.time_s);
-                numbers.extend(s.motion.pose.rotation.iter().chain(s.motion.pose.position.iter()));
-                numbers.extend(s.motion.twist.vector().iter());
-                numbers.extend(s.motion.acceleration.vector().iter());
-                numbers.extend(s.command);
-            }
-        }
-        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-        std::fs::File::create(&path).unwrap().write_all(&bytes).unwrap();
-        println!("{path} {played:?} {:?} {delay:?} residual {:?}", began.elapsed(), first.residual);
-    });
+    for (world, cause) in worlds {
+        let of_world = || trials.iter().filter(|trial| trial.0 == world);
+        let [values, beyond]: [usize; 2] =
+            [of_world().map(|trial| trial.1).sum(), of_world().map(|trial| trial.2).sum()];
+        let refused = of_world().filter(|trial| trial.3).count();
+        println!(
+            "{world:?}: {beyond} of {values} values beyond three deviations, {refused} of {} refused",
+            of_world().count()
+        );
+        let is_covered = 1000 * beyond <= 15 * values;
+        assert!(is_covered || cause.is_some() && refused == of_world().count(), "{world:?}");
+        assert!(world != World::Exact || 100 * refused <= of_world().count(), "false alarms: {refused}");
+    }
+    certificate.finish(format_args!("each covered or named"));
 }

@@ -78,7 +78,9 @@ pub enum IdentifyError {
         "{0} was recorded with other joints (leg.base_m, leg.platform_m) than the recordings before it; record all with one file"
     )]
     OtherJoints(PathBuf),
-    #[error("{path}: not written: {sentence} {remedy}, and record again; --force writes the file nevertheless")]
+    #[error(
+        "{path}: not written: {sentence} {remedy}, and record again; --force writes the file nevertheless"
+    )]
     DoesNotHold { path: PathBuf, sentence: String, remedy: String },
     #[error("--known-mass = {0} kg: must be greater than 0")]
     Weight(f64),
@@ -190,5 +192,11 @@ fn delay(config: &Config, machine: &Machine, stretches: &[RecordedStretch]) -> D
     });
     let used_s = shown.map_or(config.deployment.drive.total_delay_s(), |found| found.mean.delay_s);
     let deviation_s = shown.map_or(FILE_DELAY_RATIO * used_s, |found| found.mean.deviation_s);
-    Delay { used_s, deviation_s, shown, lag_s: config.deployment.drive.lag_s, file_s: config.deployment.drive.delay_s }
+    Delay {
+        used_s,
+        deviation_s,
+        shown,
+        lag_s: config.deployment.drive.lag_s,
+        file_s: config.deployment.drive.delay_s,
+    }
 }

@@ -33,7 +33,9 @@ const fn words(cause: Cause) -> (&'static str, &'static str) {
         Cause::Gravity => ("direction of gravity", "level the base, or correct gravity_m_s2"),
         Cause::Joints => ("places of the joints", "calibrate leg.base_m, leg.platform_m"),
         Cause::LengthSensor => ("zero or scale of a length sensor", "home and calibrate the length sensors"),
-        Cause::Elasticity => ("base or legs that yield", "stiffen the base, tighten its bolts, use a gentler motion"),
+        Cause::Elasticity => {
+            ("base or legs that yield", "stiffen the base, tighten its bolts, use a gentler motion")
+        }
         Cause::Stiction => ("friction near standstill", "record a faster motion: raise --amplitude"),
         Cause::Play => ("play between leg and length sensor", "remove the play"),
         Cause::LoosePayload => ("body that moves on the platform", "fasten payload and cables"),
@@ -96,7 +98,12 @@ impl fmt::Display for Verdict {
         let header = [("cause", Left), ("explains", Right), ("significance", Right), ("remedy", Left)];
         let cells = |row: &Row| {
             let Finding { explained, significance, .. } = row.finding;
-            [row.text.into(), format!("{:.1} %", 1e2 * explained), format!("{significance:.1}"), row.remedy.into()]
+            [
+                row.text.into(),
+                format!("{:.1} %", 1e2 * explained),
+                format!("{significance:.1}"),
+                row.remedy.into(),
+            ]
         };
         writeln!(f, "\n{}", text_table(2, &header, self.causes.iter().map(cells)))
     }

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::equations::{BODY, Equation, GROUP, PAYLOAD, SCALE, UNKNOWNS};
 use super::fit::{DIFFERENCE, Fit, GAUGE, autocorrelation, residual};
-use super::hypotheses::{Cause, Column, Hypotheses, delay_column};
+use super::hypotheses::{Cause, Column, Hypotheses, delay_column, stops};
 use super::parameters::{FREE, Free, LOG_SCALE, Parameters};
 use super::{Load, Run};
 use hexad_core::model::LEGS;
@@ -37,6 +37,8 @@ const SIGNIFICANT: f64 = 3.3;
 /// Share of the squares of the residuals that a hypothesis explains from which the model does not hold. Smoothing of the samples alone
 /// gives 0.4 %.
 const MATERIAL: f64 = 0.01;
+/// Least force that it explains, over the RMS command, for the same: less comes from the smoothing of the samples, too.
+const MATERIAL_FORCE: f64 = 1e-4;
 /// Lags over which residuals of a leg must not be alike, in groups: noise and its feedback have ended.
 const LAGS: core::ops::Range<usize> = 6..30;
 /// Least mean correlation over them from which the model does not hold.
@@ -44,7 +46,7 @@ const MATERIAL_CORRELATION: f64 = 0.05;
 /// Hypotheses whose changes of the parameters widen the deviations.
 const WIDENING: usize = 2;
 /// How far the delay may be off before the equations show it, over its deviation: friction in proportion to the load biases it.
-const DELAY_RATIO: f64 = 3.0;
+const DELAY_RATIO: f64 = 5.0;
 /// The parameters and the delay.
 const ALL: usize = FREE + 1;
 
@@ -88,6 +90,8 @@ struct Rows {
     r: DVector<f64>,
     blocks: Vec<usize>,
     causes: Vec<Cause>,
+    /// Sum of the squares of the commands over sigma.
+    commands: f64,
 }
 
 impl Rows {
@@ -106,11 +110,13 @@ impl Rows {
         }
         let hypotheses = Hypotheses::new(machine);
         let (mut j, mut h, mut r, mut blocks, mut causes) = (vec![], vec![], vec![], vec![], vec![]);
+        let mut commands = 0.0;
         for (run, equations) in runs {
             let mut with_load = inertial_parameters(machine);
             let payload = unknowns.fixed_rows::<BODY>(PAYLOAD) * f64::from(run.load == Load::Payload);
             let mut body = with_load.fixed_rows_mut::<BODY>(0);
             body += run.load.parameters() + payload;
+            let stops = stops(machine, &run.samples);
             let (begin_s, duration_s) = (run.samples.first()?.time_s, run.duration_s());
             let first_block = blocks.last().map_or(0, |last| last + 1);
             let mut group: Option<(usize, Vec<Column>, Vector6<f64>)> = None;
@@ -118,7 +124,11 @@ impl Rows {
                 let (since_s, leg) = (equation.time_s - begin_s, equation.leg);
                 if group.as_ref().is_none_or(|(first, ..)| *first != equation.first) {
                     let samples = run.samples.get(equation.first..equation.first + GROUP)?;
-                    let columns = hypotheses.columns(samples, &with_load, 2.0 * since_s / duration_s - 1.0)?;
+                    let columns = hypotheses.columns(
+                        samples,
+                        &with_load,
+                        (2.0 * since_s / duration_s - 1.0, stops.get(equation.first)?),
+                    )?;
                     group = Some((equation.first, columns, delay_column(samples)?));
                 }
                 let (_, columns, delay) = group.as_ref()?;
@@ -126,17 +136,24 @@ impl Rows {
                 let value = residual(equation, &unknowns) / fit.sigma;
                 let slope = slopes.tr_mul(&equation.coefficients) / (scale * fit.sigma)
                     - slopes.row(SCALE + leg).transpose() * (value / scale);
-                j.extend(slope.iter().copied().chain([delay.row(leg).x * DELAY_RATIO * delay_deviation_s / fit.sigma]));
+                j.extend(
+                    slope
+                        .iter()
+                        .copied()
+                        .chain([delay.row(leg).x * DELAY_RATIO * delay_deviation_s / fit.sigma]),
+                );
                 h.extend(columns.iter().map(|(_, forces)| forces.row(leg).x / (scale * fit.sigma)));
                 r.push(value);
+                commands += (equation.coefficients.row(SCALE + leg).x / fit.sigma).powi(2);
                 blocks.push(first_block + (since_s / BLOCK_S) as usize);
                 if causes.is_empty() {
                     causes = columns.iter().map(|(cause, _)| *cause).collect();
                 }
             }
         }
-        let (j, h) = (DMatrix::from_row_slice(r.len(), ALL, &j), DMatrix::from_row_slice(r.len(), causes.len(), &h));
-        Some(Self { j, h, r: r.into(), blocks, causes })
+        let (j, h) =
+            (DMatrix::from_row_slice(r.len(), ALL, &j), DMatrix::from_row_slice(r.len(), causes.len(), &h));
+        Some(Self { j, h, r: r.into(), blocks, causes, commands })
     }
 }
 
@@ -170,23 +187,34 @@ pub(super) fn examine(
     widen(&(by_delay * (widened_s / (DELAY_RATIO * delay_deviation_s).max(f64::MIN_POSITIVE))));
 
     let a = normal.solve(&j.tr_mul(h));
-    let mut findings: Vec<_> = Cause::TESTED.iter().filter_map(|cause| rows.finding(*cause, &a, fit.inflation)).collect();
+    let mut findings: Vec<_> =
+        Cause::TESTED.iter().filter_map(|cause| rows.finding(*cause, &a, fit.inflation)).collect();
     findings.sort_by(|(x, _), (y, _)| y.rank.total_cmp(&x.rank));
     findings.iter().take(WIDENING).for_each(|(_, change)| widen(change));
-    let findings = findings.into_iter().map(|(finding, _)| finding).chain(correlated(runs, fit, parameters)).collect();
+    let findings = findings
+        .into_iter()
+        .map(|(finding, _)| finding)
+        .chain(correlated(
+            runs,
+            fit,
+            parameters,
+            rows.r.norm_squared() > MATERIAL_FORCE.powi(2) * rows.commands,
+        ))
+        .collect();
     Some(Examination { findings, delay_deviation_s: widened_s })
 }
 
 impl Rows {
     /// What the residuals say of a hypothesis, and by how much it changes the parameters; `None` if it is not significant.
     fn finding(&self, cause: Cause, a: &DMatrix<f64>, inflation: f64) -> Option<(Finding, DVector<f64>)> {
-        let Self { j, h, r, blocks, causes } = self;
+        let Self { j, h, r, blocks, causes, commands } = self;
         let indices: Vec<_> = (0..causes.len()).filter(|index| causes.get(*index) == Some(&cause)).collect();
         let (a, h) = (a.select_columns(&indices), h.select_columns(&indices));
         let k = &h - j * &a;
         let block_count = blocks.last()? + 1;
         let eigen = (k.tr_mul(&k) + a.tr_mul(&a)).symmetric_eigen();
-        let mut order: Vec<_> = eigen.eigenvalues.iter().copied().enumerate().filter(|(_, x)| *x > LEAST_EFFECT).collect();
+        let mut order: Vec<_> =
+            eigen.eigenvalues.iter().copied().enumerate().filter(|(_, x)| *x > LEAST_EFFECT).collect();
         order.sort_by(|(_, x), (_, y)| y.total_cmp(x));
         order.truncate(MAX_DIRECTIONS.min(block_count / BLOCKS_PER_DIRECTION));
         let directions = eigen.eigenvectors.select_columns(order.iter().map(|(index, _)| index));
@@ -205,20 +233,26 @@ impl Rows {
         let statistic = score.dot(&variance.solve(&score));
         let [k, b] = [order.len(), block_count].map(|count| count as f64);
         let significance = normal_score(statistic * (b - k) / (k * b), k, b - k);
-        let explained = score.dot(&c) / r.norm_squared();
+        let explained = (score.dot(&c) / r.norm_squared()).min(1.0);
+        let is_material = explained > MATERIAL && score.dot(&c) > MATERIAL_FORCE.powi(2) * commands;
         let count = r.len() as f64 / inflation;
         let rank = -count * (1.0 - explained).max(f64::MIN_POSITIVE).ln() - k * count.ln();
-        let is_material = explained > MATERIAL;
         (significance > SIGNIFICANT)
             .then(|| (Finding { cause, significance, explained, is_material, rank }, -(a * c)))
     }
 }
 
 /// The leg whose residuals are most alike over [`LAGS`], if they are.
-fn correlated(runs: &[(&Run, Vec<Equation>)], fit: &Fit, parameters: &Parameters) -> Option<Finding> {
+fn correlated(
+    runs: &[(&Run, Vec<Equation>)],
+    fit: &Fit,
+    parameters: &Parameters,
+    is_large: bool,
+) -> Option<Finding> {
     let unknowns = parameters.unknowns(&fit.free);
     let of_leg = |leg: usize| {
-        let equations = runs.iter().flat_map(|(_, equations)| equations).filter(|equation| equation.leg == leg);
+        let equations =
+            runs.iter().flat_map(|(_, equations)| equations).filter(|equation| equation.leg == leg);
         let values: Vec<_> = equations.map(|equation| residual(equation, &unknowns)).collect();
         let mean = LAGS.map(|lag| autocorrelation(&values, lag)).sum::<f64>() / LAGS.len() as f64;
         let near: f64 = (1..LAGS.start).map(|lag| autocorrelation(&values, lag).powi(2)).sum();
@@ -227,7 +261,7 @@ fn correlated(runs: &[(&Run, Vec<Equation>)], fit: &Fit, parameters: &Parameters
         (mean, mean / deviation)
     };
     let (explained, significance) = (0..LEGS).map(of_leg).max_by(|(_, x), (_, y)| x.total_cmp(y))?;
-    let is_material = explained > MATERIAL_CORRELATION;
+    let is_material = is_large && explained > MATERIAL_CORRELATION;
     let finding = Finding { cause: Cause::Correlation, significance, explained, is_material, rank: 0.0 };
     (significance > SIGNIFICANT).then_some(finding)
 }

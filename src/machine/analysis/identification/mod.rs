@@ -7,6 +7,7 @@
 //! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
 //! | most probable parameters, their deviations | `fit` |
 //! | base parameters by the equations alone | `least_squares` |
+//! | whether the residuals are noise, and what the model lacks otherwise | `examination`, `hypotheses` |
 //!
 //! Equations alone do not distinguish all parameters, see [`hexad_core::model::regressor`]: what they leave open stays as the file
 //! has it. Without a known weight on the platform in one of the recordings no motion distinguishes the mean of the force
@@ -20,6 +21,7 @@ use self::least_squares::least_squares;
 use self::parameters::{Bodies, FREE, Free, Parameters};
 use crate::analysis::excitation_design::base_values;
 use hexad_core::model::LEGS;
+use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::machine::{Machine, Platform};
 use hexad_core::model::regressor::InertialParameters;
 
@@ -132,7 +134,8 @@ impl Identification {
     /// of the delay with which their samples were made. `None` if a pose is singular.
     pub fn examine(&mut self, runs: &[Run], delay_deviation_s: f64) -> Option<Examination> {
         let Self { machine, parameters, fit, is_scale_known, .. } = self;
-        let runs: Vec<_> = runs.iter().map(|run| (run, equations(machine, &run.samples, &run.load))).collect();
+        let runs: Vec<_> =
+            runs.iter().map(|run| (run, equations(machine, &run.samples, &run.load))).collect();
         examination::examine((machine, parameters, fit), &runs, *is_scale_known, delay_deviation_s)
     }
 
@@ -183,6 +186,8 @@ pub struct Prediction {
     pub leg: usize,
     /// First instant of the group, since the first release of the stretch \[s\].
     pub time_s: f64,
+    /// Length \[m\] and rate \[m/s\] of the leg in the middle of the group.
+    pub motion: [f64; 2],
     /// Recorded command \[N\].
     pub command: f64,
     /// Recorded command less the machine's \[N\].
@@ -196,7 +201,11 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
     let prediction = |equation: Equation| {
         let command = equation.coefficients.row(SCALE + equation.leg).x;
         let residual = fit::residual(&equation, &unknowns);
-        Prediction { leg: equation.leg, time_s: equation.time_s, command, residual }
+        let middle =
+            run.samples.get(equation.first + GROUP / 2).map(|sample| leg_motion(machine, &sample.motion));
+        let of_leg = |values: [f64; LEGS]| values.get(equation.leg).copied().unwrap_or_default();
+        let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length), of_leg(legs.rate)]);
+        Prediction { leg: equation.leg, time_s: equation.time_s, motion, command, residual }
     };
     equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
 }
