@@ -23,7 +23,7 @@ pub(super) struct Verdict {
 struct Row {
     #[serde(flatten)]
     finding: Finding,
-    text: &'static str,
+    text: String,
     remedy: &'static str,
 }
 
@@ -41,12 +41,7 @@ const fn words(cause: Cause) -> (&'static str, &'static str) {
         Cause::LoosePayload => ("body that moves on the platform", "fasten payload and cables"),
         Cause::Drift => ("friction that changes with time", "warm the drives up, record again"),
         Cause::Delays => ("delays that differ between drives", "set all drives alike"),
-        Cause::Leg1 => ("leg 1: its length, speed or time", "look at its residuals (--page)"),
-        Cause::Leg2 => ("leg 2: its length, speed or time", "look at its residuals (--page)"),
-        Cause::Leg3 => ("leg 3: its length, speed or time", "look at its residuals (--page)"),
-        Cause::Leg4 => ("leg 4: its length, speed or time", "look at its residuals (--page)"),
-        Cause::Leg5 => ("leg 5: its length, speed or time", "look at its residuals (--page)"),
-        Cause::Leg6 => ("leg 6: its length, speed or time", "look at its residuals (--page)"),
+        Cause::Leg(_) => ("", "look at its residuals (--page)"),
         Cause::Correlation => ("residuals that last", "look at them over time (--page)"),
     }
 }
@@ -55,6 +50,10 @@ impl Verdict {
     pub fn new(examination: &Examination) -> Self {
         let row = |finding: &Finding| {
             let (text, remedy) = words(finding.cause);
+            let text = match finding.cause {
+                Cause::Leg(leg) => format!("leg {leg}: its length, speed or time"),
+                _ => text.into(),
+            };
             Row { finding: *finding, text, remedy }
         };
         Self { holds: examination.holds(), causes: examination.findings.iter().map(row).collect() }
@@ -62,7 +61,7 @@ impl Verdict {
 
     /// One sentence.
     pub fn sentence(&self) -> String {
-        let named: Vec<_> = self.causes.iter().take(NAMED).map(|row| row.text).collect();
+        let named: Vec<_> = self.causes.iter().take(NAMED).map(|row| row.text.as_str()).collect();
         match (self.holds, named.is_empty()) {
             (true, true) => "The residuals are noise: the model holds.".into(),
             (true, false) => format!(
@@ -99,7 +98,7 @@ impl fmt::Display for Verdict {
         let cells = |row: &Row| {
             let Finding { explained, significance, .. } = row.finding;
             [
-                row.text.into(),
+                row.text.clone(),
                 format!("{:.1} %", 1e2 * explained),
                 format!("{significance:.1}"),
                 row.remedy.into(),

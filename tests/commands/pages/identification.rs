@@ -65,7 +65,6 @@ fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -
 fn identified(folder: &Folder) -> (String, Value, Option<Value>) {
     let (page, (_, text, _)) =
         (folder.path("page.html"), folder.run("identify @/motion.mcap --page @/page.html"));
-    std::fs::copy(&page, "/tmp/ident_page.html").unwrap();
     has(&text, &[&format!("page with charts: {}", page.display())]);
     let (_, json, _) = folder.run("identify @/motion.mcap --json");
     let shown = Browser::find().map(|browser| {

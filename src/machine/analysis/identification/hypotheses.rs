@@ -38,42 +38,10 @@ pub enum Cause {
     Drift,
     /// Delays of the drives differ from each other.
     Delays,
-    /// Forces of a leg depend on its length, direction, speed or on time.
-    Leg1,
-    /// See above.
-    Leg2,
-    /// See above.
-    Leg3,
-    /// See above.
-    Leg4,
-    /// See above.
-    Leg5,
-    /// See above.
-    Leg6,
+    /// Forces of this leg, from 1, depend on its length, direction, speed or on time.
+    Leg(usize),
     /// Residuals that follow each other are alike.
     Correlation,
-}
-
-impl Cause {
-    /// Those that have columns.
-    pub(super) const TESTED: [Self; 9 + LEGS] = [
-        Self::Gravity,
-        Self::Joints,
-        Self::LengthSensor,
-        Self::Elasticity,
-        Self::Stiction,
-        Self::Play,
-        Self::LoosePayload,
-        Self::Drift,
-        Self::Delays,
-        Self::Leg1,
-        Self::Leg2,
-        Self::Leg3,
-        Self::Leg4,
-        Self::Leg5,
-        Self::Leg6,
-    ];
-    const LEGS: [Self; LEGS] = [Self::Leg1, Self::Leg2, Self::Leg3, Self::Leg4, Self::Leg5, Self::Leg6];
 }
 
 /// Size of each change: of lengths over the radius of the platform, the angle of gravity \[rad\], of forces over the largest, of a delay.
@@ -296,7 +264,7 @@ fn leg_columns(
 ) -> Vec<Column> {
     let [shortest, longest] = [machine.actuator.min_length, machine.actuator.max_length];
     let delayed = (after.command - before.command) * (DELAY_S / (2.0 * step_s));
-    let of_leg = |(leg, cause): (usize, Cause)| {
+    let of_leg = |leg: usize| {
         let unit = unit(leg);
         let force = unit * (FORCE_RATIO * machine.actuator.max_force);
         let place = (2.0 * now.length.dot(&unit) - shortest - longest) / (longest - shortest);
@@ -309,9 +277,9 @@ fn leg_columns(
             (Cause::Drift, force * (sign * time)),
             (Cause::Delays, unit.component_mul(&delayed)),
         ];
-        own.map(|value| (cause, force * value)).into_iter().chain(others)
+        own.map(|value| (Cause::Leg(leg + 1), force * value)).into_iter().chain(others)
     };
-    Cause::LEGS.into_iter().enumerate().flat_map(of_leg).collect()
+    (0..LEGS).flat_map(of_leg).collect()
 }
 
 /// Change of the residuals by a delay that is 1 s longer than that of the samples \[N\].
