@@ -223,9 +223,11 @@ fn certificate_what_the_model_lacks_is_covered_or_named() {
             "{world:?}: {beyond} of {values} values beyond three deviations, {refused} of {} refused",
             of_world().count()
         );
-        let is_covered = 1000 * beyond <= 15 * values;
+        // Play acts as friction does, so that nothing shows it: docs/identification.md.
+        let per_mille = if matches!(world, World::Backlash(_)) { 100 } else { 15 };
+        let is_covered = 1000 * beyond <= per_mille * values;
         assert!(is_covered || cause.is_some() && refused == of_world().count(), "{world:?}");
         assert!(world != World::Exact || 100 * refused <= of_world().count(), "false alarms: {refused}");
     }
-    certificate.finish(format_args!("each covered or named"));
+    certificate.finish("each covered or named");
 }

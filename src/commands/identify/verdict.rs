@@ -69,8 +69,7 @@ impl Verdict {
                 named.join("; ")
             ),
             (false, _) => format!(
-                "The model does not hold: residuals show what it lacks, the most likely first: {}. The deviations contain the change by \
-                 the first two.",
+                "The model does not hold: residuals show what it lacks, the most likely first: {}. The deviations contain what these change.",
                 named.join("; ")
             ),
         }

@@ -44,7 +44,7 @@ const LAGS: core::ops::Range<usize> = 6..30;
 /// Least mean correlation over them from which the model does not hold.
 const MATERIAL_CORRELATION: f64 = 0.05;
 /// Hypotheses whose changes of the parameters widen the deviations.
-const WIDENING: usize = 2;
+const WIDENING: usize = 4;
 /// How far the delay may be off before the equations show it, over its deviation: friction in proportion to the load biases it.
 const DELAY_RATIO: f64 = 5.0;
 /// The parameters and the delay.
