@@ -187,8 +187,11 @@ pub(super) fn examine(
     widen(&(by_delay * (widened_s / (DELAY_RATIO * delay_deviation_s).max(f64::MIN_POSITIVE))));
 
     let a = normal.solve(&j.tr_mul(h));
-    let mut findings: Vec<_> =
-        rows.tested().into_iter().filter_map(|cause| rows.finding(cause, &a, fit.inflation)).collect();
+    let mut findings: Vec<_> = rows
+        .tested()
+        .into_iter()
+        .filter_map(|cause| rows.finding(cause, (&a, &score), fit.inflation))
+        .collect();
     findings.sort_by(|(x, _), (y, _)| y.rank.total_cmp(&x.rank));
     findings.iter().take(WIDENING).for_each(|(_, change)| widen(change));
     let findings = findings
@@ -217,7 +220,12 @@ impl Rows {
     }
 
     /// What the residuals say of a hypothesis, and by how much it changes the parameters; `None` if it is not significant.
-    fn finding(&self, cause: Cause, a: &DMatrix<f64>, inflation: f64) -> Option<(Finding, DVector<f64>)> {
+    fn finding(
+        &self,
+        cause: Cause,
+        (a, gradient): (&DMatrix<f64>, &DVector<f64>),
+        inflation: f64,
+    ) -> Option<(Finding, DVector<f64>)> {
         let Self { j, h, r, blocks, causes, commands } = self;
         let indices: Vec<_> = (0..causes.len()).filter(|index| causes.get(*index) == Some(&cause)).collect();
         let (a, h) = (a.select_columns(&indices), h.select_columns(&indices));
@@ -231,8 +239,8 @@ impl Rows {
         let directions = eigen.eigenvectors.select_columns(order.iter().map(|(index, _)| index));
         let effects = DVector::from_iterator(order.len(), order.iter().map(|(_, effect)| *effect));
         let (a, k) = (a * &directions, k * &directions);
-        // The prior's rows are zero at the fit, but for rounding.
-        let score = h.tr_mul(r).tr_mul(&directions).transpose();
+        // The gradient is not zero where friction is at its bound.
+        let score = directions.tr_mul(&h.tr_mul(r)) - a.tr_mul(gradient);
         let c = score.component_div(&effects);
         let rest = r - &k * &c;
         let mut sums = DMatrix::zeros(block_count, order.len());
