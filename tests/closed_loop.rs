@@ -18,6 +18,7 @@ mod feedback;
 mod fidelities;
 mod hardware_failures;
 mod identification;
+mod identification_worlds;
 mod inputs;
 mod limits;
 mod modes;

@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use hexad::analysis::identification::{Load, MotionSample, Run, identify, prediction_errors};
+use hexad::analysis::identification::{Cause, Load, MotionSample, Run, identify, prediction_errors};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::random::Random;
 use hexad::model::transmission::Transmission;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use hexad_support::identified::{Series, drawn, loaded, worst_error};
 use hexad_support::machine;
@@ -63,6 +63,33 @@ fn parameters_are_found_within_their_deviations() {
         });
         println!("predicts an unused motion to {after:.3} N, with the file {before:.3} N");
         assert!(after < 0.2 * before, "{name} {share}: {after} of {before}");
+    }
+}
+
+/// The examination finds nothing where the model holds, and the direction of gravity where that is off by a degree; what it finds widens
+/// the deviations until they contain the errors.
+#[test]
+fn gravity_that_is_off_is_found_and_contained() {
+    let mut random = Random::new(5);
+    let file = machine("motion_base");
+    let (exact, series) = (drawn(&file, &mut random), Series::new(&file, 1.0, &mut random));
+    let mut tilted = exact.clone();
+    tilted.gravity = Rotation3::new(Vector3::new(0.01, 0.0145, 0.0)) * exact.gravity;
+    for (truth, is_exact) in [(&exact, true), (&tilted, false)] {
+        let runs = [run(truth, &series, 30.0, 2.0, Load::Empty, &mut random)];
+        let mut found = identify(&file, &runs, false).unwrap();
+        let friction = |machine: &Machine, _: &_| machine.actuator.viscous_friction[0];
+        let before = found.estimate(friction).deviation;
+        // A delay that is known to 0.1 ms only matters to friction.
+        let examination = found.examine(&runs, 1e-4).unwrap();
+        println!("{examination:?}");
+        assert_eq!(examination.holds(), is_exact);
+        let named = examination.findings.first().map(|finding| finding.cause);
+        assert!(is_exact || named == Some(Cause::Gravity), "{named:?}");
+        let after = found.estimate(friction);
+        assert!(after.deviation > before, "{after:?} {before}");
+        let off = after.value - truth.actuator.viscous_friction[0];
+        assert!(off.abs() < 4.0 * after.deviation, "{off} {after:?}");
     }
 }
 

@@ -67,12 +67,17 @@ impl Series {
 
 /// Largest error of a parameter in its own deviations.
 pub fn worst_error(found: &Identification, truth: &Machine) -> f64 {
-    let mut worst = 0.0_f64;
+    errors(found, truth).into_iter().fold(0.0, |worst, error| worst.max(error.abs()))
+}
+
+/// Error of each parameter in its own deviations.
+pub fn errors(found: &Identification, truth: &Machine) -> Vec<f64> {
+    let mut errors = vec![];
     let mut check = |name: &str, of: &dyn Fn(&Machine) -> f64| {
         let Estimated { value, deviation, .. } = found.estimate(|machine, _| of(machine));
         let error = (value - of(truth)) / deviation;
         println!("{name:20} {value:.5} +- {deviation:.5}, true {:.5}: {error:.1} deviations", of(truth));
-        worst = worst.max(error.abs());
+        errors.push(error);
     };
     check("mass", &|machine| machine.platform.mass);
     check("mass with rods", &|machine| machine.platform.mass + 6.0 * machine.rod.mass);
@@ -89,5 +94,5 @@ pub fn worst_error(found: &Identification, truth: &Machine) -> f64 {
         check("load friction", &|machine| machine.actuator.load_friction[leg]);
         check("force scale", &|machine| machine.actuator.force_scale[leg]);
     }
-    worst
+    errors
 }

@@ -7,6 +7,7 @@ use clap::Args;
 use self::new_values::new_values;
 use self::recordings::Recorded;
 use self::report::{Delay, IdentificationReport, predicted};
+use self::verdict::Verdict;
 use super::failure::{CommandError, Failure};
 use super::machine_file::{changed_margins, difference, edited, write_new};
 use super::quantity::{length, list};
@@ -21,11 +22,14 @@ mod page;
 mod quantities;
 mod recordings;
 mod report;
+mod verdict;
 
 /// Largest double standard deviation of a delay that is shown, as a ratio of the delay and \[s\]. Half a millisecond more
 /// or less hardly affects the loop.
 const MAX_DELAY_RATIO: f64 = 0.1;
 const MAX_DELAY_DEVIATION_S: f64 = 5e-4;
+/// Standard deviation of the file's delay, as a ratio of it.
+const FILE_DELAY_RATIO: f64 = 0.5;
 
 #[derive(Debug, Args)]
 pub struct IdentifyArguments {
@@ -50,6 +54,9 @@ pub struct IdentifyArguments {
     /// New machine file with the result; a payload is then a part of the platform
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Write the new machine file also if the residuals show that the model does not hold, with a warning at its beginning
+    #[arg(long, requires = "output")]
+    force: bool,
     /// Page with charts: change of each parameter, forces and residuals with the file and with the result (HTML)
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
@@ -71,6 +78,10 @@ pub enum IdentifyError {
         "{0} was recorded with other joints (leg.base_m, leg.platform_m) than the recordings before it; record all with one file"
     )]
     OtherJoints(PathBuf),
+    #[error(
+        "{path}: not written: {sentence} {remedy}, and record again; --force writes the file nevertheless"
+    )]
+    DoesNotHold { path: PathBuf, sentence: String, remedy: String },
     #[error("--known-mass = {0} kg: must be greater than 0")]
     Weight(f64),
 }
@@ -104,11 +115,14 @@ impl IdentifyArguments {
             |runs: &[Run]| identify(machine, runs, holds_machine).ok_or(IdentifyError::TooLittle);
         // The delay shows once masses and friction are about right, and these are exact once the delay is.
         let first = identified(&runs(config.deployment.drive.total_delay_s()))?;
-        let delay = delay(&config, &first.machine, &empty);
+        let mut delay = delay(&config, &first.machine, &empty);
         let runs = runs(delay.used_s);
-        let found = identified(&runs)?;
+        let mut found = identified(&runs)?;
+        let examination = found.examine(&runs, delay.deviation_s).ok_or(IdentifyError::TooLittle)?;
+        delay.widen(examination.delay_deviation_s);
+        let verdict = Verdict::new(&examination);
         let validation = runs_of(&other, Load::Empty, delay.used_s);
-        let report = IdentificationReport::new(&config, &found, &runs, &validation, delay);
+        let report = IdentificationReport::new(&config, &found, &runs, &validation, delay, verdict);
         match self.json {
             true => print_json(&report)?,
             false => print(&report)?,
@@ -121,7 +135,16 @@ impl IdentifyArguments {
             }
         }
         let Some(path) = &self.output else { return Ok(()) };
-        let new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
+        let mut new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
+        let verdict = report.verdict();
+        match (verdict.holds, self.force) {
+            (true, _) => {}
+            (false, true) => new.insert_str(0, &verdict.comment()),
+            (false, false) => {
+                let (sentence, remedy) = (verdict.sentence(), capitalized(verdict.remedy()));
+                return Err(IdentifyError::DoesNotHold { path: path.clone(), sentence, remedy }.into());
+            }
+        }
         let changed = Config::parse(&new, "the new machine file")?;
         write_new(path, &new)?;
         if !self.json {
@@ -146,6 +169,12 @@ fn place(text: &str) -> Result<[f64; 3], String> {
     list(text, [length; 3], "0,-20mm,0.1m")
 }
 
+/// A clause as the beginning of a sentence.
+fn capitalized(clause: &str) -> String {
+    let mut letters = clause.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 fn runs_of(stretches: &[RecordedStretch], load: Load, delay_s: f64) -> Vec<Run> {
     stretches.iter().map(|stretch| Run { samples: samples(stretch, delay_s), load }).collect()
 }
@@ -162,5 +191,12 @@ fn delay(config: &Config, machine: &Machine, stretches: &[RecordedStretch]) -> D
         2.0 * deviation_s <= MAX_DELAY_DEVIATION_S.max(MAX_DELAY_RATIO * delay_s)
     });
     let used_s = shown.map_or(config.deployment.drive.total_delay_s(), |found| found.mean.delay_s);
-    Delay { used_s, shown, lag_s: config.deployment.drive.lag_s, file_s: config.deployment.drive.delay_s }
+    let deviation_s = shown.map_or(FILE_DELAY_RATIO * used_s, |found| found.mean.deviation_s);
+    Delay {
+        used_s,
+        deviation_s,
+        shown,
+        lag_s: config.deployment.drive.lag_s,
+        file_s: config.deployment.drive.delay_s,
+    }
 }

@@ -38,6 +38,8 @@ struct Head<'a> {
     motion: &'static str,
     /// Cells of the residuals of each leg, as in the text, and the correlation of successive ones.
     residuals: Vec<Vec<String>>,
+    /// Residuals with the result over length and over rate of each leg: place, mean and its deviation in each bin.
+    dependence: Vec<[Vec<[f64; 3]>; 2]>,
     period_s: f64,
     length_s: f64,
     /// First column of each signal.
@@ -94,6 +96,7 @@ pub(super) fn text(report: &IdentificationReport, machines: [&Machine; 2], predi
         residuals: correlated
             .map(|(cells, correlation)| [cells.to_vec(), vec![format!("{correlation:.2}")]].concat())
             .collect(),
+        dependence: dependence(machines[1], predicted),
         period_s: levels.first().map_or(1.0, |level: &LevelHead| level.step),
         length_s,
         columns: SIGNALS.into(),
@@ -101,6 +104,37 @@ pub(super) fn text(report: &IdentificationReport, machines: [&Machine; 2], predi
         levels,
     });
     page(PageKind::Identification, &title, &summary, &head, &samples)
+}
+
+/// Bins of a length or a rate, and least number of residuals in a bin that is shown.
+const BINS: usize = 24;
+const LEAST_IN_BIN: f64 = 5.0;
+
+/// Means of the residuals of each leg in bins of its length and of its rate.
+fn dependence(machine: &Machine, runs: &[Run]) -> Vec<[Vec<[f64; 3]>; 2]> {
+    let all: Vec<_> = runs.iter().flat_map(|run| predictions(machine, run)).collect();
+    let bins = |leg: usize, of: fn(&[f64; 2]) -> f64| {
+        let points =
+            || all.iter().filter(|each| each.leg == leg).map(|each| (of(&each.motion), each.residual));
+        let (least, most) =
+            points().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (x, _)| (a.min(x), b.max(x)));
+        let width = (most - least) / BINS as f64;
+        let mut sums = [[0.0; 3]; BINS];
+        for (x, residual) in points() {
+            if let Some([count, sum, squares]) = sums.get_mut((((x - least) / width) as usize).min(BINS - 1))
+            {
+                (*count, *sum, *squares) = (*count + 1.0, *sum + residual, *squares + residual * residual);
+            }
+        }
+        let shown = sums.into_iter().enumerate().filter(|(_, [count, ..])| *count >= LEAST_IN_BIN);
+        let bin = |(index, [count, sum, squares]): (usize, [f64; 3])| {
+            let mean = sum / count;
+            let deviation = ((squares / count - mean * mean).max(0.0) / count).sqrt();
+            [least + (index as f64 + 0.5) * width, mean, deviation]
+        };
+        shown.map(bin).collect::<Vec<_>>()
+    };
+    (0..LEGS).map(|leg| [bins(leg, |[length, _]| *length), bins(leg, |[_, rate]| *rate)]).collect()
 }
 
 /// Samples of a run, column by column, on a grid of equal steps.

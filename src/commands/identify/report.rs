@@ -5,6 +5,7 @@ use core::fmt;
 use serde::Serialize;
 
 use super::quantities::{BODIES, LEG_QUANTITIES, PAYLOAD, Quantity, base_parameter};
+use super::verdict::Verdict;
 use crate::commands::report::summary::Fact;
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::{Machine, Platform};
@@ -29,11 +30,23 @@ const SHOWN_RATIO: f64 = 0.5;
 pub(super) struct Delay {
     /// The one that the identification used \[s\].
     pub used_s: f64,
+    /// Its standard deviation \[s\].
+    pub deviation_s: f64,
     /// From the motion, if that shows it.
     pub shown: Option<DriveDelay>,
     /// Of the file.
     pub lag_s: f64,
     pub file_s: Option<f64>,
+}
+
+impl Delay {
+    /// A larger deviation.
+    pub fn widen(&mut self, deviation_s: f64) {
+        self.deviation_s = deviation_s;
+        if let Some(shown) = &mut self.shown {
+            shown.mean.deviation_s = deviation_s;
+        }
+    }
 }
 
 /// Result of `hexad identify`.
@@ -58,6 +71,8 @@ pub(super) struct IdentificationReport {
     is_validated: bool,
     /// Correlation of successive residuals.
     correlation: [f64; LEGS],
+    /// Whether the residuals are noise.
+    verdict: Verdict,
     /// Least squares of the equations alone, before any prior.
     base_parameters: Option<Vec<BaseParameter>>,
     /// Delay that the motion shows.
@@ -131,6 +146,7 @@ impl IdentificationReport {
         runs: &[Run],
         validation: &[Run],
         delay: Delay,
+        verdict: Verdict,
     ) -> Self {
         let has_payload = runs.iter().any(|run| run.load == Load::Payload);
         let holds_machine = runs.iter().all(|run| run.load == Load::Payload);
@@ -163,6 +179,7 @@ impl IdentificationReport {
             after: prediction_errors(&found.machine, &predicted),
             is_validated: !validation.is_empty(),
             correlation: found.correlation,
+            verdict,
             base_parameters: found.base_parameters.as_ref().map(|all| {
                 all.iter()
                     .map(|(k, value)| BaseParameter { name: base_parameter(*k), value: *value })
@@ -193,6 +210,7 @@ impl fmt::Display for IdentificationReport {
         if self.before.iter().flatten().any(|force| force.is_finite()) {
             self.fmt_prediction(f)?;
         }
+        writeln!(f, "{}", self.verdict)?;
         writeln!(f, "{}{}", self.delay_text(), self.delay_lines())
     }
 }
@@ -206,7 +224,13 @@ impl IdentificationReport {
         let mut facts =
             vec![fact("Recordings", self.extent_text()), fact("Parameters", self.shown_text()), delay];
         facts.extend(scales);
+        facts.push(Fact { name: "Model", text: self.verdict.sentence(), is_bad: !self.verdict.holds });
         facts
+    }
+
+    /// Whether the residuals are noise.
+    pub fn verdict(&self) -> &Verdict {
+        &self.verdict
     }
 
     /// Name of the machine.

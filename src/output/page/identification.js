@@ -40,18 +40,54 @@ function fillParameters(parameters) {
   }
 }
 
+// Means of residuals in bins, with bars of two deviations, between -limit and limit.
+function dependencePlot(title, unit, bins, limit) {
+  const [least, most] = [bins[0][0], bins[bins.length - 1][0]];
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 200 80");
+  svg.setAttribute("preserveAspectRatio", "none");
+  const line = (kind, x1, y1, x2, y2) => {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    made.setAttribute("class", kind);
+    Object.entries({ x1, y1, x2, y2 }).forEach(([name, value]) => made.setAttribute(name, value));
+    svg.append(made);
+  };
+  const x = (value) => 5 + (190 * (value - least)) / (most - least || 1);
+  const y = (value) => 40 - (38 * value) / limit;
+  line("zero", 0, 40, 200, 40);
+  if (least < 0 && most > 0) line("zero", x(0), 0, x(0), 80);
+  bins.forEach(([place, mean, deviation]) => {
+    line("spread", x(place), y(mean - 2 * deviation), x(place), y(mean + 2 * deviation));
+    line("mean", x(place) - 3, y(mean), x(place) + 3, y(mean));
+  });
+  const ends = [least, most].map((value) => element("span", {}, `${value.toFixed(2)} ${unit}`));
+  return element("figure", {}, element("figcaption", {}, title), svg, element("div", { className: "scale" }, ...ends));
+}
+
+function fillDependence(legs) {
+  const limit = Math.max(...legs.flat(2).map(([, mean, deviation]) => Math.abs(mean) + 2 * deviation));
+  byId("dependence-limit").textContent = quantityText(limit, "N");
+  legs.forEach(([lengths, rates], leg) => {
+    if (lengths.length === 0) return;
+    byId("dependence").append(dependencePlot(`leg ${leg + 1}, length`, "m", lengths, limit));
+    byId("dependence").append(dependencePlot(`leg ${leg + 1}, rate`, "m/s", rates, limit));
+  });
+}
+
 function begin() {
   byId("title").replaceChildren(HEAD.name, element("small", { textContent: "identification" }));
   showFacts(HEAD.facts);
   fillParameters(HEAD.parameters);
   if (levels.length === 0) {
     byId("prediction").remove();
+    byId("dependence-section").remove();
     return;
   }
   byId("motion").textContent = HEAD.motion;
   byId("step").textContent = quantityText(HEAD.levels[0].step, "s");
   byId("residuals").append(row("th", ["leg", "file RMS [N]", "largest", "identified RMS [N]", "largest", "correlation"]));
   byId("residuals").append(...HEAD.residuals.map((cells) => row("td", cells)));
+  fillDependence(HEAD.dependence);
   addFigures();
   watchKeys();
   watchSurroundings();

@@ -28,16 +28,20 @@ const CYCLES: u64 = 12_000;
 const SWAY: [(f64, f64); 6] =
     [(1e-6, 157.0), (0.03, 1.3), (-0.03, 1.6), (0.04, 1.9), (0.03, 2.2), (-0.04, 2.5)];
 
-/// Writes a recording of a motion. The forces act on a machine that is not what its file says.
-fn write(folder: &Folder, motion: &mut dyn FnMut(f64) -> Motion) {
+/// Writes a recording of a motion. The forces act on a machine that is not what its file says, whose Coulomb friction changes by
+/// `drift` in a second.
+fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -> Motion) {
     let config = folder.config();
-    let truth = drawn(&config.machine, &mut Random::new(7));
+    let mut truth = drawn(&config.machine, &mut Random::new(7));
+    let coulomb = truth.actuator.coulomb_friction;
     let info =
         RunInfo { name: config.name.clone(), configuration: config.text.clone(), ..RunInfo::default() };
     let mut file = RecordingFile::create(&folder.path("motion.mcap"), &info, None).unwrap();
-    for number in 1..=CYCLES {
+    for number in 1..=cycles {
         let release_ns = 1_000_000_000 + number * PERIOD_NS;
         let motion = motion(1e-9 * (number * PERIOD_NS) as f64);
+        let share = 1.0 + drift * 1e-9 * (number * PERIOD_NS) as f64;
+        truth.actuator.coulomb_friction = coulomb.map(|force| share * force);
         let forces = inverse_dynamics::<Exact>(&truth, &motion).unwrap();
         let (pose, length) = (motion.pose, leg_lengths(&config.machine, &motion.pose));
         let platform =
@@ -109,7 +113,7 @@ fn the_page_of_an_identification_shows_the_numbers_of_the_text() {
     let folder = Folder::new("");
     let file = folder.config().machine;
     let series = Series::new(&file, 1.0, &mut Random::new(3));
-    write(&folder, &mut |t| series.at(&file, t).motion());
+    write(&folder, CYCLES, 0.0, &mut |t| series.at(&file, t).motion());
     folder.write("page.html", "an older page");
     let (text, json, shown) = identified(&folder);
     assert!(folder.read("page.html").len() < 400_000);
@@ -149,7 +153,7 @@ fn a_leg_that_stands_has_no_residual() {
     let home: Pose = TaskState::at_rest(file.home).motion().pose;
     let at_home = leg_lengths(&file, &home);
     let mut tracker = Tracker::new(&file, home);
-    write(&folder, &mut |t| {
+    write(&folder, CYCLES, 0.0, &mut |t| {
         let length = |leg: usize| {
             let (amplitude, frequency) = SWAY[leg];
             at_home[leg] + amplitude * (frequency * t).sin()
@@ -165,4 +169,24 @@ fn a_leg_that_stands_has_no_residual() {
     drawn[0] = false;
     assert_eq!([&shown["error"], &shown["drawn"]], [&Value::Null, &Value::from(drawn)]);
     check_residuals(&json, &text, &shown);
+}
+
+/// A file of which the residuals say that the model does not hold is written only with `--force`, and says so itself.
+#[test]
+fn what_the_residuals_refuse_is_written_with_force_alone() {
+    let folder = Folder::new("");
+    let file = folder.config().machine;
+    let series = Series::new(&file, 1.0, &mut Random::new(3));
+    write(&folder, 2 * CYCLES, 0.05, &mut |t| series.at(&file, t).motion());
+    let (code, message) = folder.execute("identify @/motion.mcap --json --output @/new.toml").unwrap_err();
+    assert_eq!(code, 1);
+    has(
+        &message,
+        &["/new.toml: not written: ", "friction that changes with time", "Warm the drives up", "--force"],
+    );
+    assert!(!folder.path("new.toml").exists());
+    folder.execute("identify @/motion.mcap --json --output @/new.toml --force").unwrap();
+    let new = folder.read("new.toml");
+    assert!(new.starts_with("# WARNING (hexad identify --force): "), "{new}");
+    folder.execute("check --config @/new.toml").unwrap();
 }

@@ -52,7 +52,7 @@ pub enum Load {
 
 impl Load {
     /// Parameters of the body, in the order of the platform's parameters in the regressor.
-    fn parameters(&self) -> SVector<f64, BODY> {
+    pub(super) fn parameters(&self) -> SVector<f64, BODY> {
         let Self::Known { mass, at: [x, y, z] } = *self else { return SVector::zeros() };
         SVector::from([1.0, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
             * mass
@@ -65,6 +65,8 @@ pub(super) struct Equation {
     pub leg: usize,
     /// First instant of the group, since the first release of the stretch \[s\].
     pub time_s: f64,
+    /// Index of its first sample.
+    pub first: usize,
     pub coefficients: Unknowns,
     pub right: f64,
 }
@@ -79,7 +81,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
     let standing = standing.map(|square| STANDING_M_S.min(STANDING_RATIO * square.sqrt()));
     let known = load.parameters();
     let mut found = vec![];
-    for (samples, legs) in samples.chunks_exact(GROUP).zip(legs.chunks_exact(GROUP)) {
+    for (index, (samples, legs)) in samples.chunks_exact(GROUP).zip(legs.chunks_exact(GROUP)).enumerate() {
         if !is_gapless(samples) {
             continue;
         }
@@ -107,7 +109,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
             if *load == Load::Payload {
                 coefficients.fixed_rows_mut::<BODY>(PAYLOAD).copy_from(&-body.transpose());
             }
-            found.push(Equation { leg, time_s, coefficients, right: (body * known).x });
+            found.push(Equation { leg, time_s, first: index * GROUP, coefficients, right: (body * known).x });
         }
     }
     found

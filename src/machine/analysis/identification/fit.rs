@@ -25,9 +25,9 @@ const MAX_DAMPING: f64 = 1e12;
 /// Residual before the first fit, over the largest force.
 const FIRST_RESIDUAL_RATIO: f64 = 0.01;
 /// Step of the differences, over the deviation of a parameter.
-const DIFFERENCE: f64 = 1e-4;
+pub(super) const DIFFERENCE: f64 = 1e-4;
 /// Deviation of the mean logarithm of the force scales, where no known weight shows it.
-const GAUGE: f64 = 1e-5;
+pub(super) const GAUGE: f64 = 1e-5;
 /// What is squared and added up: equations of all legs, prior, gauge.
 const DATA_TERMS: usize = LEGS * (UNKNOWNS + 1);
 const TERMS: usize = DATA_TERMS + FREE + 1;
@@ -38,6 +38,9 @@ const MAX_LAG: usize = 50;
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub free: Free,
+    /// RMS residual \[N\], and how many equations say as much as one that is independent of the others.
+    pub sigma: f64,
+    pub inflation: f64,
     /// Covariance of the free parameters.
     pub covariance: DMatrix<f64>,
     /// Number of directions that the equations show better than the prior, and of those that the prior leaves free.
@@ -73,9 +76,12 @@ pub(super) fn fit(
     let square = |values: &Vec<f64>| values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
     let inflation = of_legs.iter().map(|leg| square(leg) * correlated_count(leg)).sum::<f64>()
         / of_legs.iter().map(square).sum::<f64>();
-    let (covariance, shown, unknown) = problem.covariance(&free, sigma * inflation.max(1.0).sqrt())?;
+    let inflation = inflation.max(1.0);
+    let (covariance, shown, unknown) = problem.covariance(&free, sigma * inflation.sqrt())?;
     Some(Fit {
         free,
+        sigma,
+        inflation,
         covariance,
         shown,
         unknown,
@@ -90,7 +96,7 @@ pub(super) fn residual(equation: &Equation, unknowns: &Unknowns) -> f64 {
 }
 
 /// Correlation of values with those `lag` later.
-fn autocorrelation(values: &[f64], lag: usize) -> f64 {
+pub(super) fn autocorrelation(values: &[f64], lag: usize) -> f64 {
     let products: f64 = values.iter().zip(values.iter().skip(lag)).map(|(a, b)| a * b).sum();
     products / values.iter().map(|x| x * x).sum::<f64>().max(f64::MIN_POSITIVE)
 }

@@ -7,6 +7,7 @@
 //! | parameters such that every value is a machine that can be built, and how far from its file it may be | `parameters` |
 //! | most probable parameters, their deviations | `fit` |
 //! | base parameters by the equations alone | `least_squares` |
+//! | whether the residuals are noise, and what the model lacks otherwise | `examination`, `hypotheses` |
 //!
 //! Equations alone do not distinguish all parameters, see [`hexad_core::model::regressor`]: what they leave open stays as the file
 //! has it. Without a known weight on the platform in one of the recordings no motion distinguishes the mean of the force
@@ -20,16 +21,21 @@ use self::least_squares::least_squares;
 use self::parameters::{Bodies, FREE, Free, Parameters};
 use crate::analysis::excitation_design::base_values;
 use hexad_core::model::LEGS;
+use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::machine::{Machine, Platform};
 use hexad_core::model::regressor::InertialParameters;
 
 mod equations;
+mod examination;
 mod fit;
+mod hypotheses;
 mod least_squares;
 mod parameters;
 pub mod samples;
 
 pub use self::equations::Load;
+pub use self::examination::{Examination, Finding};
+pub use self::hypotheses::Cause;
 pub use self::samples::{MotionSample, samples};
 
 /// Samples of one recording, and what was on the platform.
@@ -62,6 +68,8 @@ pub struct Identification {
     /// the parameters of the [regressor](hexad_core::model::regressor), then six force scales, six products of force scale and load friction, and the
     /// parameters of the payload. `None` without a known weight, or if the equations do not determine them.
     pub base_parameters: Option<Vec<(usize, f64)>>,
+    /// Whether a known weight shows the mean of the force scales, or the machine is held.
+    is_scale_known: bool,
     parameters: Parameters,
     fit: Fit,
 }
@@ -101,6 +109,7 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
         residual,
         correlation,
         base_parameters: least_squares(file, &all).filter(|_| has_known_weight),
+        is_scale_known,
         parameters,
         fit,
     })
@@ -121,6 +130,15 @@ pub fn expected_deviations(file: &Machine) -> InertialParameters {
 }
 
 impl Identification {
+    /// Tests whether the model explains the runs that were identified, and widens the deviations by what it lacks and by the deviation
+    /// of the delay with which their samples were made. `None` if a pose is singular.
+    pub fn examine(&mut self, runs: &[Run], delay_deviation_s: f64) -> Option<Examination> {
+        let Self { machine, parameters, fit, is_scale_known, .. } = self;
+        let runs: Vec<_> =
+            runs.iter().map(|run| (run, equations(machine, &run.samples, &run.load))).collect();
+        examination::examine((machine, parameters, fit), &runs, *is_scale_known, delay_deviation_s)
+    }
+
     /// A quantity of machine and payload with its deviation.
     pub fn estimate(&self, quantity: impl Fn(&Machine, &Platform) -> f64) -> Estimated {
         let Self { parameters, fit: Fit { free, covariance, .. }, .. } = self;
@@ -168,6 +186,8 @@ pub struct Prediction {
     pub leg: usize,
     /// First instant of the group, since the first release of the stretch \[s\].
     pub time_s: f64,
+    /// Length \[m\] and rate \[m/s\] of the leg in the middle of the group.
+    pub motion: [f64; 2],
     /// Recorded command \[N\].
     pub command: f64,
     /// Recorded command less the machine's \[N\].
@@ -181,7 +201,11 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
     let prediction = |equation: Equation| {
         let command = equation.coefficients.row(SCALE + equation.leg).x;
         let residual = fit::residual(&equation, &unknowns);
-        Prediction { leg: equation.leg, time_s: equation.time_s, command, residual }
+        let middle =
+            run.samples.get(equation.first + GROUP / 2).map(|sample| leg_motion(machine, &sample.motion));
+        let of_leg = |values: [f64; LEGS]| values.get(equation.leg).copied().unwrap_or_default();
+        let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length), of_leg(legs.rate)]);
+        Prediction { leg: equation.leg, time_s: equation.time_s, motion, command, residual }
     };
     equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
 }
