@@ -247,7 +247,7 @@ fn compare_worse_sensors(draws: usize) -> ([usize; WORSE.len()], usize) {
     let (mut compared, mut refused) = ([0; WORSE.len()], 0);
     for _ in 0..draws {
         let mut table = files[between(1.0, files.len() as f64 + 1.0) as usize - 1].clone();
-        let mut set = |table: &mut toml::Table, (section, key): (&str, &str), value: f64| {
+        let set = |table: &mut toml::Table, (section, key): (&str, &str), value: f64| {
             let section = table.entry(section).or_insert_with(|| toml::Table::new().into());
             section.as_table_mut().unwrap().insert(key.into(), value.into());
         };
