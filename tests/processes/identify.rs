@@ -147,6 +147,7 @@ fn a_new_machine_is_identified_as_the_guide_says() {
     for words in [
         "platform with six rods",
         "delay of the drives, from release to force",
+        "RMS of what each period repeats, and of what differs",
         "NEW.toml: written",
         "page with charts: NEW.html",
     ] {

@@ -10,7 +10,9 @@ use crate::commands::report::summary::Fact;
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::{Machine, Platform};
 use hexad_machine::analysis::drive_delay::DriveDelay;
-use hexad_machine::analysis::identification::{Estimated, Identification, Load, Run, prediction_errors};
+use hexad_machine::analysis::identification::{
+    Estimated, Identification, Load, Run, errors_by_period, prediction_errors,
+};
 use hexad_machine::config::Config;
 use hexad_machine::text::numbers::significant;
 use hexad_machine::text::text_table::{Left, MAX_WIDTH, Right, paragraph, text_table};
@@ -69,6 +71,9 @@ pub(super) struct IdentificationReport {
     after: [[f64; 2]; LEGS],
     /// Whether these are of a motion that the identification did not use.
     is_validated: bool,
+    /// RMS of what is not explained with the result, the same in each period and different from one to the next; `None` if the
+    /// motion has no two periods.
+    after_by_period: Option<[[f64; 2]; LEGS]>,
     /// Correlation of successive residuals.
     correlation: [f64; LEGS],
     /// Whether the residuals are noise.
@@ -164,6 +169,7 @@ impl IdentificationReport {
             };
             LEG_QUANTITIES.iter().map(|(name, unit, of)| Row::new(name, unit, &of_leg(*of))).collect()
         };
+        let after_by_period = errors_by_period(&found.machine, &predicted(runs, &[]));
         let predicted = predicted(runs, validation);
         Self {
             schema: SCHEMA,
@@ -177,6 +183,7 @@ impl IdentificationReport {
             legs: if holds_machine { Default::default() } else { core::array::from_fn(leg) },
             before: prediction_errors(&config.machine, &predicted),
             after: prediction_errors(&found.machine, &predicted),
+            after_by_period,
             is_validated: !validation.is_empty(),
             correlation: found.correlation,
             verdict,
@@ -299,7 +306,18 @@ impl IdentificationReport {
     fn fmt_prediction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "force [N] {} that is not explained, RMS and largest:\n", self.predicted_motion())?;
         let header = [("leg", Right), ("file", Right), ("", Right), ("identified", Right), ("", Right)];
-        writeln!(f, "{}", text_table(2, &header, self.residual_cells()))
+        writeln!(f, "{}", text_table(2, &header, self.residual_cells()))?;
+        let Some(by_period) = self.after_by_period else { return Ok(()) };
+        writeln!(
+            f,
+            "the same with the identified values in the motions of excite: RMS of what each period repeats, and of what differs:\n"
+        )?;
+        let header = [("leg", Right), ("repeats", Right), ("differs", Right)];
+        let rows = by_period
+            .iter()
+            .zip(1..)
+            .map(|([same, different], leg)| [format!("{leg}"), significant(*same), significant(*different)]);
+        writeln!(f, "{}", text_table(2, &header, rows))
     }
 
     fn delay_text(&self) -> String {

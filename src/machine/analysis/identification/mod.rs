@@ -24,6 +24,7 @@ use hexad_core::model::LEGS;
 use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::machine::{Machine, Platform};
 use hexad_core::model::regressor::InertialParameters;
+use hexad_core::motion::excitation::PERIOD_S;
 
 mod equations;
 mod examination;
@@ -208,6 +209,43 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
         Prediction { leg: equation.leg, time_s: equation.time_s, motion, command, residual }
     };
     equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
+}
+
+/// Largest distance of lengths and rates that are the same in the next period, as a ratio of stroke and largest rate, and of the
+/// instants \[s\].
+const SAME_RATIO: f64 = 2e-3;
+const SAME_S: f64 = 5e-3;
+
+/// Of the commands of each leg that a machine does not explain \[N\]: RMS of what is the same in each [period](PERIOD_S) of a
+/// motion, and of what differs from one to the next, which no model can explain. `None` if no run has two periods.
+pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LEGS]> {
+    let actuator = &machine.actuator;
+    let largest = [actuator.max_length - actuator.min_length, actuator.max_rate];
+    let mut sums = [[0.0; 3]; LEGS];
+    for run in runs {
+        let predictions = predictions(machine, run);
+        for (leg, [count, same, different]) in sums.iter_mut().enumerate() {
+            let of_leg: Vec<_> = predictions.iter().filter(|each| each.leg == leg).collect();
+            for one in &of_leg {
+                let later_s = one.time_s + PERIOD_S - SAME_S;
+                let Some(other) = of_leg.get(of_leg.partition_point(|each| each.time_s < later_s)) else {
+                    break;
+                };
+                let pairs = one.motion.iter().zip(other.motion).zip(largest);
+                let is_same = other.time_s < later_s + 2.0 * SAME_S
+                    && pairs.into_iter().all(|((a, b), most)| (a - b).abs() < SAME_RATIO * most);
+                if is_same {
+                    *count += 1.0;
+                    *same += one.residual * other.residual;
+                    *different += 0.5 * (one.residual - other.residual).powi(2);
+                }
+            }
+        }
+    }
+    let has_period = sums.iter().all(|[count, ..]| *count > 0.0);
+    has_period.then(|| {
+        sums.map(|[count, same, different]| [same, different].map(|sum| (sum / count).max(0.0).sqrt()))
+    })
 }
 
 /// RMS and largest part of the commands of each leg \[N\] in runs that a machine does not explain; NaN for a leg that nearly
