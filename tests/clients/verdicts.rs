@@ -115,7 +115,7 @@ const PROGRAM_IN_PYTHON: &str = "
 import ctypes, sys, hexad
 from hexad import messages
 verdicts = ''
-for at, name in enumerate(['Setpoint', 'Measured', 'Command', 'Force', 'Status', 'Statistics']):
+for at, name in enumerate(['Setpoint', 'Measured', 'Force', 'Status', 'Statistics']):
     kind = getattr(messages, name)
     source, target = sys.argv[1 + 2 * at : 3 + 2 * at]
     content, copied = open(source, 'rb').read(), b''

@@ -45,7 +45,7 @@ def show(struct):
         if inner not in seen:
             seen.append(inner)
             show(inner)
-for name in ['Setpoint', 'Measured', 'Command', 'Force', 'Status', 'Statistics']:
+for name in ['Setpoint', 'Measured', 'Force', 'Status', 'Statistics']:
     message = getattr(hexad.messages, name)
     assert message.type_name() == 'hexad_' + message.topic
     show(message)
