@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use hexad::analysis::identification::{Cause, Load, MotionSample, Run, identify, prediction_errors};
+use hexad::analysis::identification::{
+    Cause, Load, MotionSample, Run, errors_by_period, identify, prediction_errors,
+};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::machine::Machine;
@@ -86,6 +88,17 @@ fn gravity_that_is_off_is_found_and_contained() {
         assert_eq!(examination.holds(), is_exact);
         let named = examination.findings.first().map(|finding| finding.cause);
         assert!(is_exact || named == Some(Cause::Gravity), "{named:?}");
+        let [same, different] = errors_by_period(&found.machine, &runs)
+            .unwrap()
+            .iter()
+            .fold([0.0; 2], |[a, b], [same, different]| [a + same, b + different]);
+        // Noise of 2 N in the means of 80 ms; nothing of it repeats.
+        println!("repeats {same}, differs {different}");
+        assert!((same < 0.5 * different) == is_exact && (different - 6.0 * 0.5).abs() < 1.0);
+        assert!(
+            errors_by_period(&found.machine, &[run(truth, &series, 9.0, 2.0, Load::Empty, &mut random)])
+                .is_none()
+        );
         let after = found.estimate(friction);
         assert!(after.deviation > before, "{after:?} {before}");
         let off = after.value - truth.actuator.viscous_friction[0];

@@ -36,12 +36,12 @@
 //!
 //! # In simulated time
 //!
-//! With `realtime.release = "lockstep"` the topics are `hexad-simulated/<name>/...`. All times are those of the plant, which
-//! may begin at any instant; the epoch of `force` is the time of its first message. In each step the plant publishes
-//! `measured` of an instant; the setpoint source responds with `setpoint` of that `time_ns`, after the daemon has posted its
-//! request for that cycle if there is one; the daemon publishes `status`, then `force`, with that instant as `time_ns` and `release_ns`; the plant simulates one
-//! period. A plant that receives no response repeats its message, and a source repeats its response: a participant may not
-//! be connected yet. When the setpoint source has left, the daemon continues without setpoints.
+//! With `realtime.release = "lockstep"` the topics are `hexad-simulated/<name>/...`. All times are those of the plant, which may
+//! begin at any instant; the epoch of `force` is the time of its first message. In each step the plant publishes `measured` of an
+//! instant; the setpoint source responds with `setpoint` of that `time_ns`, after the daemon has posted its request for that cycle
+//! if there is one; the daemon publishes `status`, then `force`, with that instant as `time_ns` and `release_ns`; the plant
+//! simulates one period. A plant that receives no response repeats its message, and a source repeats its response: a participant
+//! may not be connected yet. When the setpoint source has left, the daemon continues without setpoints.
 
 use iceoryx2::prelude::ZeroCopySend;
 

@@ -5,7 +5,7 @@
 //!
 //! | bits | content |
 //! | --- | --- |
-//! | 63 | whether the instant is that of a cycle in simulated time |
+//! | 63 | 1 if the request names a cycle in simulated time |
 //! | 60 to 62 | number of the request, 0 for none |
 //! | 52 to 59 | ticket: distinguishes requests of the same microsecond |
 //! | 0 to 51 | instant \[us\], for 142 years: CLOCK_MONOTONIC of the request, or the cycle before which it is not obeyed |

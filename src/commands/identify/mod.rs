@@ -79,9 +79,9 @@ pub enum IdentifyError {
     )]
     OtherJoints(PathBuf),
     #[error(
-        "{path}: not written: {sentence} {remedy}, and record again; --force writes the file nevertheless"
+        "{path}: not written, because the model does not hold; most likely {cause}: {remedy}, and record again; --force writes the file nevertheless"
     )]
-    DoesNotHold { path: PathBuf, sentence: String, remedy: String },
+    DoesNotHold { path: PathBuf, cause: String, remedy: &'static str },
     #[error("--known-mass = {0} kg: must be greater than 0")]
     Weight(f64),
 }
@@ -137,13 +137,12 @@ impl IdentifyArguments {
         let Some(path) = &self.output else { return Ok(()) };
         let mut new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
         let verdict = report.verdict();
-        match (verdict.holds, self.force) {
-            (true, _) => {}
-            (false, true) => new.insert_str(0, &verdict.comment()),
-            (false, false) => {
-                let (sentence, remedy) = (verdict.sentence(), capitalized(verdict.remedy()));
-                return Err(IdentifyError::DoesNotHold { path: path.clone(), sentence, remedy }.into());
-            }
+        if !verdict.holds && !self.force {
+            let (cause, remedy) = verdict.first();
+            return Err(IdentifyError::DoesNotHold { path: path.clone(), cause, remedy }.into());
+        }
+        if !verdict.holds {
+            new.insert_str(0, &verdict.comment());
         }
         let changed = Config::parse(&new, "the new machine file")?;
         write_new(path, &new)?;
@@ -167,12 +166,6 @@ impl IdentifyArguments {
 /// A place: three numbers with commas between them.
 fn place(text: &str) -> Result<[f64; 3], String> {
     list(text, [length; 3], "0,-20mm,0.1m")
-}
-
-/// A clause as the beginning of a sentence.
-fn capitalized(clause: &str) -> String {
-    let mut letters = clause.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn runs_of(stretches: &[RecordedStretch], load: Load, delay_s: f64) -> Vec<Run> {

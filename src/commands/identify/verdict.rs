@@ -75,14 +75,15 @@ impl Verdict {
         }
     }
 
-    /// What to do first.
-    pub fn remedy(&self) -> &'static str {
-        self.causes.first().map_or("", |row| row.remedy)
+    /// The most likely cause, and what to do.
+    pub fn first(&self) -> (String, &'static str) {
+        self.causes.first().map(|row| (row.text.clone(), row.remedy)).unwrap_or_default()
     }
 
     /// Comment for the beginning of a file.
     pub fn comment(&self) -> String {
-        let text = format!("WARNING (hexad identify --force): {} First: {}.", self.sentence(), self.remedy());
+        let text =
+            format!("WARNING (hexad identify --force): {} First: {}.", self.sentence(), self.first().1);
         paragraph("", &text, MAX_WIDTH - 2).lines().map(|line| format!("# {line}\n")).collect()
     }
 }
@@ -103,6 +104,6 @@ impl fmt::Display for Verdict {
                 row.remedy.into(),
             ]
         };
-        writeln!(f, "\n{}", text_table(2, &header, self.causes.iter().map(cells)))
+        write!(f, "\n{}", text_table(2, &header, self.causes.iter().map(cells)))
     }
 }

@@ -182,7 +182,11 @@ fn what_the_residuals_refuse_is_written_with_force_alone() {
     assert_eq!(code, 1);
     has(
         &message,
-        &["/new.toml: not written: ", "friction that changes with time", "Warm the drives up", "--force"],
+        &[
+            "/new.toml: not written, because",
+            "most likely friction that changes with time: warm the drives up",
+            "--force",
+        ],
     );
     assert!(!folder.path("new.toml").exists());
     folder.execute("identify @/motion.mcap --json --output @/new.toml --force").unwrap();

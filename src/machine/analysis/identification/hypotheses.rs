@@ -1,8 +1,8 @@
 //! What the model may lack, as changes of the forces of the legs, by differences at the middle of each group of samples.
 //!
 //! A machine with other joints, or with other sensors of the lengths, stands elsewhere when it has the measured lengths. So an error of
-//! a joint or of a length displaces the measured motion by `dX = N^-T dL`, with its derivatives; the forces are then those of the
-//! other machine in the displaced motion.
+//! a joint or of a length displaces the measured motion by `dX = N^-T dL`, with its derivatives; forces follow by the inverse dynamics of
+//! the other machine in the displaced motion.
 
 use nalgebra::{Matrix6, Rotation3, Vector3, Vector6};
 
@@ -282,7 +282,7 @@ fn leg_columns(
     (0..LEGS).flat_map(of_leg).collect()
 }
 
-/// Change of the residuals by a delay that is 1 s longer than that of the samples \[N\].
+/// Change of the residuals by a delay 1 s longer than the samples were made with \[N\].
 pub(super) fn delay_column(group: &[MotionSample]) -> Option<Vector6<f64>> {
     let middle = group.len() / 2;
     let (before, after) = (group.get(middle - REACH)?, group.get(middle + REACH)?);
