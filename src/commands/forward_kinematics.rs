@@ -135,7 +135,8 @@ pub fn forward_kinematics(
         let (tracked, iterations) = walker.find(machine, &six(row, 1));
         let converged = tracked == TrackingResult::Found;
         let others = if converged {
-            *others.get_or_insert_with(|| other_permitted_modes(machine, walker.kinematic_state()).len())
+            *others
+                .get_or_insert_with(|| other_permitted_modes(machine, walker.kinematic_state()).poses.len())
         } else {
             0
         };

@@ -2,14 +2,12 @@
 //! While there is one, the controller does not begin control.
 //!
 //! The lengths alone do not determine the assembly mode. An external pose (`pose_valid = 1`) or an operator selects it. The search for poses that the
-//! joints permit takes some milliseconds. A wider one, over the region in which
-//! `hexad check` searches around home, follows once for some tenths of a second, and only warns.
+//! joints permit takes some milliseconds. A wider one, also among poses that they do not permit, follows once, and only warns.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::thread::Builder;
 
-use rayon::ThreadPoolBuilder;
 use tracing::{info, warn};
 
 use super::cycle::CycleRecord;
@@ -85,19 +83,24 @@ impl PoseSearch {
 /// Searches, and says what was found.
 fn search(machine: &Machine, gate: &PoseGate, here: &KinematicState, found: u32) {
     let others = other_permitted_modes(machine, here);
-    let poses = core::iter::once(here).chain(&others).map(|it| *it.pose()).collect();
+    let poses = core::iter::once(here).chain(&others.poses).map(|it| *it.pose()).collect();
     let list = gate.list(machine, poses);
-    if !others.is_empty() {
+    if !others.poses.is_empty() {
         warn!("several poses have the measured leg lengths, so control does not begin: {list}");
+    } else if others.are_all {
+        info!("no other pose has the measured leg lengths: proved");
+    } else {
+        info!(
+            "no other pose with the measured leg lengths was found: searched without proof, as a singular pose has nearly these lengths"
+        );
     }
-    gate.end_search(found, others.len() as u32);
+    gate.end_search(found, others.poses.len() as u32);
 }
 
 /// Logs the nearest other pose where the platform may be instead, although a singular pose is between, or it is turned further than the
 /// joints are said to permit.
 fn warn_of_other_modes(machine: &Machine, here: &KinematicState) {
-    let Ok(pool) = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build() else { return };
-    let others = pool.install(|| other_modes(machine, here));
+    let others = other_modes(machine, here);
     if let Some(nearest) = others.iter().find(|other| other.is_confusable()) {
         let x = task_coordinates(here.pose(), &machine.home);
         warn!(

@@ -3,14 +3,11 @@
 
 use std::f64::consts::PI;
 
-use hexad::analysis::assembly_modes::{SearchRegion, find_modes};
+use hexad::analysis::assembly_proof::{Modes, all_modes};
 
 use super::*;
 
 const LENGTHS: [f64; 6] = [1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071];
-
-/// From this many starts the search finds all.
-const STARTS: u64 = 100_000;
 
 fn dietmaier() -> Machine {
     let mut dietmaier = machine("tsai2000");
@@ -40,21 +37,17 @@ fn dietmaier() -> Machine {
     dietmaier
 }
 
-static MODES: LazyLock<Vec<KinematicState>> = LazyLock::new(|| {
-    // The first joints are the origins, so C is at the first length from the origin.
-    let center = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
-    find_modes(&dietmaier(), &LENGTHS, &SearchRegion { center, turn: PI, shift: 1.0 }, STARTS)
-});
+static MODES: LazyLock<Modes> = LazyLock::new(|| all_modes(&dietmaier(), &LENGTHS, &Matrix3::identity(), PI));
 
 #[test]
 fn all_forty_are_found() {
     let dietmaier = dietmaier();
-    assert_eq!(MODES.len(), 40);
-    for mode in MODES.iter() {
+    assert_eq!(MODES.poses.len(), 40);
+    for mode in &MODES.poses {
         let lengths = leg_lengths(&dietmaier, mode.pose());
         assert!(lengths.iter().zip(&LENGTHS).all(|(a, b)| (a - b).abs() < 1e-12), "{lengths:?}");
     }
-    let positive = MODES.iter().filter(|mode| mode.sensitivity().determinant > 0.0).count();
+    let positive = MODES.poses.iter().filter(|mode| mode.sensitivity().determinant > 0.0).count();
     // Solutions are born and die in pairs of opposite sign.
     assert_eq!(positive, 20);
 }
@@ -65,7 +58,7 @@ fn all_forty_are_found() {
 fn small_motions_stay_on_their_mode() {
     let dietmaier = dietmaier();
     let mut singular = 0;
-    for (k, mode) in MODES.iter().enumerate() {
+    for (k, mode) in MODES.poses.iter().enumerate() {
         let sensitivity = mode.sensitivity();
         let size = sensitivity.trusted_step * 3.0;
         if sensitivity.condition > MAX_CONDITION {

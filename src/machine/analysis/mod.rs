@@ -19,6 +19,7 @@
 //! These functions may allocate, so the cycle does not call them.
 
 pub mod assembly_modes;
+pub mod assembly_proof;
 pub mod batch;
 pub mod clearance;
 pub mod drive_capability;

@@ -1,8 +1,6 @@
 //! Random poses, found from home by us and by others.
 
-use std::f64::consts::FRAC_PI_2;
-
-use hexad::analysis::assembly_modes::{SearchRegion, find_modes};
+use hexad::analysis::assembly_proof::all_modes;
 use hexad::model::forward_kinematics::{Outcome, Tracker, TrackingResult, refine};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::kinematic_state::KinematicState;
@@ -14,14 +12,14 @@ use hexad::model::task::TaskState;
 use super::rivals;
 use super::rivals::Update;
 
+/// More than the largest rotation of a pose from home, 60 degrees about each axis \[rad\].
+const MAX_TURN_RAD: f64 = 2.0;
+
 /// Farther apart than this (radian, or radius) are two poses.
 const APART: f64 = 1e-5;
 
 /// Largest shift of a pose from home, in radii.
 const SHIFT: f64 = 0.3;
-
-/// Starts of a search for other poses.
-const STARTS: u64 = 2000;
 
 /// Poses on the way from home that are looked at for [`within_reach`].
 const WAY: u32 = 40;
@@ -79,9 +77,8 @@ pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
 /// side of home: what start-up has to ask before it believes one of them.
 pub fn ambiguous(machine: &Machine, x: [f64; 6]) -> bool {
     let center = rigid(machine.home);
-    let region = SearchRegion { center, turn: FRAC_PI_2, shift: 2.0 * machine.joints.radius };
     let home = KinematicState::new(machine, center).sensitivity().determinant;
-    let found = find_modes(machine, &leg_lengths(machine, &rigid(x)), &region, STARTS);
+    let found = all_modes(machine, &leg_lengths(machine, &rigid(x)), &center.rotation, MAX_TURN_RAD).poses;
     found.iter().filter(|mode| mode.sensitivity().determinant * home > 0.0).count() > 1
 }
 
