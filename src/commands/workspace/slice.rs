@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::clearance::Clearance;
-use hexad_machine::analysis::other_pose_search::nearest_permitted;
+use hexad_machine::analysis::other_pose_search::{nearest_permitted, search_density};
 use hexad_machine::analysis::pose_quality::{PoseEvaluator, PoseQuality};
 use hexad_machine::text::csv_table::coordinates;
 use hexad_machine::text::csv_writer::CsvWriter;
@@ -21,7 +21,7 @@ use hexad_machine::text::files::FileError;
 /// Poses along each axis during the search for the range.
 const COARSE_POSES: usize = 41;
 /// Poses along each axis, at most, that are searched for other permitted poses.
-const MAX_SEARCHED_POSES: usize = 41;
+const MAX_SEARCHED_POSES: f64 = 41.0;
 /// First range to both sides: in strokes, and \[rad\].
 const FIRST_RANGE_STROKES: f64 = 0.1;
 const FIRST_RANGE_RAD: f64 = 0.1;
@@ -102,7 +102,7 @@ impl Slice {
             ranges: [(0.0, 0.0); 2],
             count: COARSE_POSES,
             qualities: vec![],
-            search_step: count.div_ceil(MAX_SEARCHED_POSES),
+            search_step: 1,
             searched: 0,
             ambiguous: vec![],
         };
@@ -114,6 +114,8 @@ impl Slice {
 
     /// The same with a search of its usable poses for other permitted poses with the same lengths.
     pub fn with_other_poses(mut self, machine: &Machine, clearance: &Clearance) -> Self {
+        let most = MAX_SEARCHED_POSES * search_density(machine);
+        self.search_step = (self.count as f64 / most).ceil() as usize;
         let indices = || (0..self.count).step_by(self.search_step);
         let pose = |places: &[usize; 2]| TaskState::at_rest(self.x(*places)).motion().pose;
         let all = indices().flat_map(|up| indices().map(move |right| [right, up]));

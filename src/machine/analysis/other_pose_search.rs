@@ -4,6 +4,7 @@
 //! usable (R. M. Neal, Slice sampling, 2003). A search, without proof. The poses are the same in every run, and a longer search begins with
 //! those of a shorter one.
 
+use core::f64::consts::PI;
 use core::fmt;
 
 use nalgebra::Vector3;
@@ -12,6 +13,7 @@ use serde::Serialize;
 
 use super::assembly_modes::other_permitted_modes;
 use super::clearance::Clearance;
+use crate::text::numbers::significant;
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::random::Random;
@@ -23,6 +25,9 @@ const WALK_STEP: f64 = 4.0;
 const STEP_PAIRS_PER_POSE: usize = 3;
 /// Bound on the attempts of a step. About ten are usual for strokes of a thousandth of the radius.
 const MAX_ATTEMPTS_PER_STEP: usize = 40;
+
+/// Permitted rotation beyond which fewer poses are searched, as each takes longer.
+const USUAL_ROTATION_RAD: f64 = PI / 6.0;
 
 /// Result of a search of rest poses for other permitted poses with the same lengths.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -54,8 +59,9 @@ pub struct PoseDistance {
 }
 
 impl OtherPoseSearch {
-    /// Searches at most so many rest poses; home alone if it is not usable.
-    pub fn new(machine: &Machine, clearance: &Clearance, count: usize) -> Self {
+    /// Searches so many rest poses, fewer for a large permitted rotation; home alone if it is not usable.
+    pub fn new(machine: &Machine, clearance: &Clearance, usual_count: usize) -> Self {
+        let count = (usual_count as f64 * search_density(machine).powi(2)) as usize;
         let (poses, home) = (rest_poses(machine, clearance, count), machine.home_pose());
         let rotation = |pose: &Pose| home.displacement_to(pose).angular.norm();
         let found: Vec<_> = poses.par_iter().map(|pose| nearest_permitted(machine, pose)).collect();
@@ -69,6 +75,11 @@ impl OtherPoseSearch {
             nearest: nearest(found.into_iter().flatten()),
         }
     }
+}
+
+/// Poses along an axis that are worth their time, relative to a machine with the usual rotation.
+pub fn search_density(machine: &Machine) -> f64 {
+    (USUAL_ROTATION_RAD / machine.max_rotation).min(1.0)
 }
 
 fn nearest(found: impl Iterator<Item = PoseDistance>) -> Option<PoseDistance> {
@@ -120,7 +131,8 @@ fn rest_poses(machine: &Machine, clearance: &Clearance, count: usize) -> Vec<Pos
 
 impl fmt::Display for PoseDistance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.1} deg and {:.3} m away", self.rotation_rad.to_degrees(), self.shift_m)
+        let [rotation_deg, shift_m] = [self.rotation_rad.to_degrees(), self.shift_m].map(significant);
+        write!(f, "{rotation_deg} deg and {shift_m} m away")
     }
 }
 
@@ -134,14 +146,14 @@ impl fmt::Display for OtherPoseSearch {
         match (&self.nearest, self.ambiguous_from_rad) {
             (Some(nearest), Some(from)) => write!(
                 f,
-                "in the usable region from {nearest} on; starts are ambiguous from {:.1} deg of rotation of home on \
+                "in the usable region from {nearest} on; starts are ambiguous from {} deg of rotation of home on \
                  (searched, {ambiguous_poses} of {poses} poses)",
-                from.to_degrees()
+                significant(from.to_degrees())
             ),
             _ => write!(
                 f,
-                "in the usable region none found up to {:.1} deg (searched, {poses} poses)",
-                self.largest_rotation_rad.to_degrees()
+                "in the usable region none found up to {} deg (searched, {poses} poses)",
+                significant(self.largest_rotation_rad.to_degrees())
             ),
         }
     }
