@@ -47,6 +47,7 @@
 //! | --- | --- |
 //! | active, engaging, parking, stopping, standby, off, fault | states of the controller, see [`control::signals::state`] |
 //! | actuator, drive | prismatic joint of a leg with its motor; stroke, rate and force are limited |
+//! | ambiguous start | start at rest with leg lengths that another permitted pose has, too, see [`analysis::other_pose_search`] |
 //! | approach | motion of the reference to a setpoint or target that is away from it |
 //! | assembly mode | one of the up to 40 poses that share the same six leg lengths |
 //! | axial, transverse | along a leg; normal to it |

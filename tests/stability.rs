@@ -8,6 +8,7 @@ mod dietmaier;
 mod fichter;
 mod gimbal;
 mod legs;
+mod numpy;
 mod passing;
 mod random;
 mod sampled;

@@ -4,6 +4,7 @@
 
 mod command;
 mod forces;
+mod other_poses;
 mod regions;
 
 use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};

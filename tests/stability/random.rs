@@ -52,7 +52,7 @@ fn poses_far_from_home_are_found_where_others_fail() {
 
 /// The first of 100,000 random poses that are in the stroke, as far from home as the joints permit, and well conditioned. `spread` is
 /// their largest turn about each axis \[rad\] and their largest shift in strokes, at most in radii.
-fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec<[f64; 6]> {
+pub(super) fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec<[f64; 6]> {
     let side = KinematicState::new(machine, machine.home_pose()).sensitivity().determinant;
     let radius = machine.joints.radius;
     // Short strokes permit little of the rest.
@@ -75,7 +75,7 @@ fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec<[f64; 6]> 
 }
 
 const NEAR: [f64; 2] = [0.1, 0.2];
-const WIDE: [f64; 2] = [0.5, 1.5];
+pub(super) const WIDE: [f64; 2] = [0.5, 1.5];
 
 fn is_missing(machine: &Machine, x: &[f64; 6]) -> bool {
     let truth = rigid(*x);
@@ -109,7 +109,7 @@ fn starts(name: &str, machine: &Machine, most: usize, spread: [f64; 2]) -> [usiz
 }
 
 /// With the joints moved, and a stroke around the lengths at home.
-fn scattered(number: usize) -> Machine {
+pub(super) fn scattered(number: usize) -> Machine {
     let mut machine = machine(MACHINES[number % MACHINES.len()]);
     let (mut random, mut legs) = (Random::new(number as u64), Legs::of(&machine));
     let size = 0.3 * machine.joints.radius;
@@ -170,9 +170,10 @@ fn poses_of_the_long_search_are_among_those_of_their_lengths() {
 #[test]
 #[ignore = "second tier: takes long"]
 fn the_true_pose_is_among_those_of_its_lengths_in_a_long_search() {
-    for name in MACHINES {
-        let machine = machine(name);
-        let poses = permitted(&machine, usize::MAX, WIDE);
+    let named = MACHINES.map(|name| (name.into(), machine(name), usize::MAX));
+    let random = (0..25).map(|number| (format!("random {number}"), scattered(number), 2000));
+    for (name, machine, most) in named.into_iter().chain(random) {
+        let poses = permitted(&machine, most, WIDE);
         let missing: Vec<_> = poses.par_iter().filter(|x| is_missing(&machine, x)).collect();
         println!("{name}: {} poses, {} missing", poses.len(), missing.len());
         assert!(missing.is_empty(), "{name}: {} of {}: {:?}", missing.len(), poses.len(), missing[0]);

@@ -12,7 +12,7 @@ fn workspace(name: &str, output: &Path, more: &[&str]) -> Output {
     command.env_remove("HEXAD_LOG").output().unwrap()
 }
 
-fn said(name: &str, output: &Path, more: &[&str]) -> String {
+pub(super) fn said(name: &str, output: &Path, more: &[&str]) -> String {
     let ended = workspace(name, output, more);
     let errors = String::from_utf8(ended.stderr).unwrap();
     assert_eq!((ended.status.code(), errors.as_str()), (Some(0), ""), "no terminal, no bar");

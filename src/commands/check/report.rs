@@ -11,6 +11,8 @@ use hexad_core::model::inverse_geometry::{leg_directions, leg_lengths};
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::assembly_modes::other_modes;
+use hexad_machine::analysis::clearance::Clearance;
+use hexad_machine::analysis::other_pose_search::OtherPoseSearch;
 use hexad_machine::config::control_loops::{ControlLoop, longest_age_s, loops};
 use hexad_machine::config::deployment::default_limits::{DerivedLimit, derived_limits};
 use hexad_machine::config::examination::Examination;
@@ -19,6 +21,8 @@ use hexad_machine::text::numbers::MotionDigits;
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
+/// Rest poses that are searched for other permitted poses: a tenth of a second. `hexad workspace` searches more.
+const SEARCHED_POSES: usize = 100;
 
 /// Findings, and the machine at home, at rest. Numbers that do not exist are null in JSON.
 #[derive(Clone, Debug, Serialize)]
@@ -46,6 +50,8 @@ pub struct CheckReport {
     /// Those of them that the joints permit: a start at home asks in which the platform stands.
     pub permitted_other_poses: usize,
     pub nearest_pose: Option<OtherPose>,
+    /// Other permitted poses of rest poses.
+    pub other_pose_search: OtherPoseSearch,
     /// Limits that the reference keeps.
     pub motion_limits: MotionLimits,
     /// Ranges of `[envelope]` that are below them.
@@ -122,6 +128,8 @@ impl CheckReport {
         let leg_modes_hz = [root(masses.softest_mode_gain), root(masses.stiffest_mode_gain)];
         let constants =
             Constants::new(machine, hexad_daemon::parameters(machine, deployment, Fidelity::Exact));
+        let reachable = machine.within_margin(limits.stroke_margin_m);
+        let clearance = Clearance::new(&reachable, constants.max_reference_condition);
         Self {
             schema: SCHEMA,
             machine: name.clone(),
@@ -142,6 +150,7 @@ impl CheckReport {
                 .find(|mode| mode.is_confusable())
                 .or_else(|| others.first())
                 .map(|mode| OtherPose { text: mode.to_string(), is_confusable: mode.is_confusable() }),
+            other_pose_search: OtherPoseSearch::new(machine, &clearance, SEARCHED_POSES),
             motion_limits: MotionLimits::new(limits),
             exceedable_ranges: deployment
                 .envelope

@@ -94,10 +94,8 @@ impl CheckReport {
             self.rate_hz,
         )?;
         let Some(nearest) = &self.nearest_pose else {
-            return writeln!(
-                f,
-                "other poses with these lengths    none found within 90 deg and 2 radii of home"
-            );
+            writeln!(f, "other poses with these lengths    none found within 90 deg and 2 radii of home")?;
+            return self.fmt_search(f);
         };
         let count = self.other_poses;
         writeln!(f, "other poses with these lengths    {count} found, the nearest {}", nearest.text)?;
@@ -115,7 +113,11 @@ impl CheckReport {
                 "WARNING: home.max_rotation_deg permits {count} of them: control begins at home only after hexad engage --pose N"
             )?;
         }
-        Ok(())
+        self.fmt_search(f)
+    }
+
+    fn fmt_search(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "other permitted poses             {}", self.other_pose_search)
     }
 }
 

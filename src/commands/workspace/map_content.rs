@@ -16,6 +16,8 @@ use hexad_machine::analysis::pose_quality::PoseQuality;
 const MAX_FORCE_RATIO: f64 = 5.0;
 /// Colour of the lines at which a singular pose ends the reach.
 const SINGULAR_COLOR: u32 = 0xC8_430F;
+/// Colour of the hatch, which no map has.
+const AMBIGUOUS_COLOR: u32 = 0xFF_5FA2;
 
 /// Style and name of a line in the legend.
 pub(super) type LegendSample = (ShapeStyle, &'static str);
@@ -102,6 +104,7 @@ impl MapDrawing<'_> {
             let parts = outlines.iter().flat_map(|outline| caused(outline, cause));
             lines.extend(parts.map(|part| (sample, part.into_iter().map(|at| on_axes(slice, at)).collect())));
         }
+        lines.extend(hatch(slice));
         if self.has_ball(slice) {
             let [x, y] = slice.plane.0.map(|axis| self.machine.home.get(axis).copied().unwrap_or_default());
             let angles = (0..=90).map(|k| f64::from(k) * TAU / 90.0);
@@ -132,6 +135,18 @@ impl MapDrawing<'_> {
             outlines.iter().flat_map(|outline| outline.iter().chain(outline.first()).chain(&origin));
         bridged.map(|corner| on_axes(slice, corner.at)).collect()
     }
+}
+
+/// A line through each row of neighbours with another permitted pose.
+fn hatch(slice: &Slice) -> impl Iterator<Item = MapLine> {
+    let (step, half) = (slice.search_step, 0.5 * slice.search_step as f64);
+    let runs = slice.ambiguous.chunk_by(move |[left, up], next| *next == [left + step, *up]);
+    let sample = (rgb(AMBIGUOUS_COLOR).stroke_width(15), "another permitted pose, same lengths");
+    runs.filter_map(move |run| {
+        let ([[first, up], ..], [.., [last, _]]) = (run, run) else { return None };
+        let ends = [*first as f64 - half, *last as f64 + half];
+        Some((sample, ends.map(|right| on_axes(slice, (right, *up as f64))).into()))
+    })
 }
 
 /// A position in the units of the axes: metres and degrees.

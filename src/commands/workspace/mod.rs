@@ -21,6 +21,7 @@ use hexad_core::model::machine::Machine;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::clearance::{Clearance, WorkspaceLimit};
 use hexad_machine::analysis::envelope::EnvelopeBounds;
+use hexad_machine::analysis::other_pose_search::OtherPoseSearch;
 use hexad_machine::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
 use hexad_machine::analysis::reachable_envelope;
 use hexad_machine::analysis::region_search::{MAX_CELLS, RegionBounds, largest_region};
@@ -35,6 +36,9 @@ mod map;
 mod map_content;
 mod report;
 pub mod slice;
+
+/// Rest poses that are searched for other permitted poses: about a second.
+const SEARCHED_POSES: usize = 1000;
 
 #[derive(Debug, Args)]
 pub struct WorkspaceArguments {
@@ -138,7 +142,7 @@ impl WorkspaceReport {
             linear: query.acceleration_m_s2.unwrap_or(limits.position.acceleration),
             angular: query.angular_acceleration_rad_s2.unwrap_or(limits.orientation.acceleration),
         };
-        let slices = slices(machine, effort, query, through);
+        let slices = slices(machine, &clearance, effort, query, through);
         let envelope = deployment.envelope.filter(has_extent);
         let shape = envelope.unwrap_or_else(|| reachable_envelope::nominal_bounds(machine));
         let regions = regions(&reachable, &clearance, query.turn, &shape);
@@ -156,6 +160,7 @@ impl WorkspaceReport {
             slices,
             regions: region_reports(regions, query.turn.to_degrees(), envelope.is_some(), largest_condition),
             largest_box: BoxRange::all(&shape, regions[2].guaranteed),
+            other_pose_search: OtherPoseSearch::new(machine, &clearance, SEARCHED_POSES),
             hint: None,
             files,
         };
@@ -165,6 +170,7 @@ impl WorkspaceReport {
 
 fn slices(
     machine: &Machine,
+    clearance: &Clearance,
     effort: AccelerationDemand,
     query: &WorkspaceQuery,
     through: [f64; 6],
@@ -173,7 +179,10 @@ fn slices(
     let default = Plane::default_three(&machine.gravity);
     let planes = if query.planes.is_empty() { &default[..] } else { &query.planes };
     let bar = item_bar(planes.len() * query.resolution * query.resolution, "poses");
-    let slice = |plane: &Plane| Slice::new(&workspace, machine, *plane, through, query.resolution, &bar);
+    let slice = |plane: &Plane| {
+        let slice = Slice::new(&workspace, machine, *plane, through, query.resolution, &bar);
+        slice.with_other_poses(machine, clearance)
+    };
     let slices = planes.iter().map(slice).collect();
     bar.finish_and_clear();
     slices

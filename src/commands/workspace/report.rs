@@ -14,6 +14,7 @@ use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::clearance::Clearance;
 use hexad_machine::analysis::drive_capability::DriveCapability;
 use hexad_machine::analysis::envelope::EnvelopeBounds;
+use hexad_machine::analysis::other_pose_search::OtherPoseSearch;
 use hexad_machine::analysis::pose_quality::PoseQuality;
 use hexad_machine::analysis::region_search::RegionBounds;
 use hexad_machine::text::numbers::{AXES, axis_unit, significant};
@@ -41,6 +42,8 @@ pub struct WorkspaceReport {
     pub regions: Vec<RegionReport>,
     /// Ranges of the largest guaranteed box.
     pub largest_box: Vec<BoxRange>,
+    /// Other permitted poses of rest poses of the usable region.
+    pub other_pose_search: OtherPoseSearch,
     /// Reason why there is no payload.
     pub hint: Option<String>,
     /// Maps and their tables.
@@ -54,6 +57,9 @@ pub struct SliceReport {
     pub poses: usize,
     pub in_reach: usize,
     pub usable: usize,
+    /// Usable poses that were searched for other permitted poses, and those with one.
+    pub searched: usize,
+    pub ambiguous: usize,
     pub largest_margin_m: f64,
     pub condition: [f64; 2],
     pub worst_force_n: [f64; 2],
@@ -98,6 +104,8 @@ impl SliceReport {
             poses: slice.qualities.len(),
             in_reach: in_reach.count(),
             usable: usable.len(),
+            searched: slice.searched,
+            ambiguous: slice.ambiguous.len(),
             largest_margin_m,
             condition: ends(|quality| quality.condition),
             worst_force_n: ends(|quality| quality.worst_force),
@@ -105,13 +113,14 @@ impl SliceReport {
         }
     }
 
-    fn cells(&self) -> [String; 8] {
+    fn cells(&self) -> [String; 9] {
         let range = |[low, high]: [f64; 2]| format!("{} to {}", significant(low), significant(high));
         [
             self.plane.clone(),
             self.poses.to_string(),
             self.in_reach.to_string(),
             self.usable.to_string(),
+            format!("{} of {}", self.ambiguous, self.searched),
             format!("up to {}", significant(1e3 * self.largest_margin_m)),
             range(self.condition),
             range(self.worst_force_n),
@@ -205,6 +214,7 @@ impl fmt::Display for WorkspaceReport {
             "poses",
             "in reach",
             "usable",
+            "ambiguous",
             "margin [mm]",
             "condition",
             "worst force [N]",
@@ -216,8 +226,8 @@ impl fmt::Display for WorkspaceReport {
             f,
             "\nin reach: within the stroke, on home's side of singular poses; usable: the reference goes there, the condition\n\
              is up to {} ({CONDITION_MEANING}), no leg is near the first axis of its\n\
-             universal joint, and holding takes at most {:.0} % of the force. Numbers are of usable poses; the actuators'\n\
-             limit is {} N.\n",
+             universal joint, and holding takes at most {:.0} % of the force. ambiguous: with another permitted pose for the same\n\
+             lengths, of the usable poses that were searched. Numbers are of usable poses; the actuators' limit is {} N.\n",
             significant(self.condition_limit),
             100.0 * MAX_HOLDING_SHARE,
             significant(self.max_force_n)
@@ -237,7 +247,11 @@ impl fmt::Display for WorkspaceReport {
             [format!("  {}", range.axis), format!("{low} to {high} {unit}")]
         });
         write!(f, "\n{}", text_table(2, &[("box", Left), ("offset from home", Right)], rows))?;
-        writeln!(f)?;
+        writeln!(
+            f,
+            "\n{}",
+            paragraph("other permitted poses: ", &self.other_pose_search.to_string(), HINT_WIDTH)
+        )?;
         self.files.iter().try_for_each(|path| writeln!(f, "written: {}", path.display()))
     }
 }

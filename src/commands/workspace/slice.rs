@@ -11,6 +11,8 @@ use rayon::prelude::*;
 
 use hexad_core::model::machine::Machine;
 use hexad_core::model::task::TaskState;
+use hexad_machine::analysis::clearance::Clearance;
+use hexad_machine::analysis::other_pose_search::{nearest_permitted, search_density};
 use hexad_machine::analysis::pose_quality::{PoseEvaluator, PoseQuality};
 use hexad_machine::text::csv_table::coordinates;
 use hexad_machine::text::csv_writer::CsvWriter;
@@ -18,6 +20,8 @@ use hexad_machine::text::files::FileError;
 
 /// Poses along each axis during the search for the range.
 const COARSE_POSES: usize = 41;
+/// Poses along each axis, at most, that are searched for other permitted poses.
+const MAX_SEARCHED_POSES: f64 = 41.0;
 /// First range to both sides: in strokes, and \[rad\].
 const FIRST_RANGE_STROKES: f64 = 0.1;
 const FIRST_RANGE_RAD: f64 = 0.1;
@@ -76,6 +80,10 @@ pub struct Slice {
     /// Poses along each axis.
     pub count: usize,
     pub qualities: Vec<PoseQuality>,
+    /// Steps between poses that are searched for other permitted poses, the number of searched ones, and the indices of those with another.
+    pub search_step: usize,
+    pub searched: usize,
+    pub ambiguous: Vec<[usize; 2]>,
 }
 
 impl Slice {
@@ -88,12 +96,35 @@ impl Slice {
         count: usize,
         bar: &ProgressBar,
     ) -> Self {
-        let mut slice =
-            Self { plane, through, ranges: [(0.0, 0.0); 2], count: COARSE_POSES, qualities: vec![] };
+        let mut slice = Self {
+            plane,
+            through,
+            ranges: [(0.0, 0.0); 2],
+            count: COARSE_POSES,
+            qualities: vec![],
+            search_step: 1,
+            searched: 0,
+            ambiguous: vec![],
+        };
         slice.ranges = slice.range_of_reach(workspace, machine);
         slice.count = count;
         slice.evaluate(workspace, bar);
         slice
+    }
+
+    /// The same with a search of its usable poses for other permitted poses with the same lengths.
+    pub fn with_other_poses(mut self, machine: &Machine, clearance: &Clearance) -> Self {
+        let most = MAX_SEARCHED_POSES * search_density(machine);
+        self.search_step = (self.count as f64 / most).ceil() as usize;
+        let indices = || (0..self.count).step_by(self.search_step);
+        let pose = |places: &[usize; 2]| TaskState::at_rest(self.x(*places)).motion().pose;
+        let all = indices().flat_map(|up| indices().map(move |right| [right, up]));
+        let usable: Vec<_> = all.filter(|places| clearance.violation_at(&pose(places)).is_none()).collect();
+        let searched = usable.len();
+        let is_ambiguous = |places: &[usize; 2]| nearest_permitted(machine, &pose(places)).is_some();
+        let ambiguous = usable.into_par_iter().filter(is_ambiguous).collect();
+        (self.searched, self.ambiguous) = (searched, ambiguous);
+        self
     }
 
     /// X of a pose by its indices along both axes.

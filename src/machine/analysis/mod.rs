@@ -6,7 +6,7 @@
 //! | terms of the model that they need | [`fidelity_error`], [`fidelity_choice`] |
 //! | workspace | [`drive_capability`], [`pose_quality`], [`region_shape`], [`clearance`], [`region_search`], [`region_proof`] |
 //! | collisions between legs | [`leg_crossing`] |
-//! | other poses with the same leg lengths | [`assembly_modes`] |
+//! | other poses with the same leg lengths | [`assembly_modes`], [`other_pose_search`] |
 //! | parameters of a machine from recorded motions | [`identification`], [`drive_delay`] |
 //! | how fast the platform leaves a pose under constant forces | [`held_forces`] |
 //! | motion that shows the parameters | [`excitation_design`] |
@@ -33,6 +33,7 @@ pub mod held_forces;
 pub mod identification;
 mod known_delay;
 pub mod leg_crossing;
+pub mod other_pose_search;
 pub mod pose_quality;
 pub mod pose_spline;
 pub mod reachable_envelope;
