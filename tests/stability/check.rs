@@ -32,7 +32,7 @@ fn another_pose_nearby_is_told() {
     let far = checked(0.0);
     assert!(!far.contains("WARNING"), "{far}");
     assert!(
-        far.contains("\nother permitted poses             at home none found; in the usable region "),
+        far.contains("\nother permitted poses             at home none (proved); in the usable region "),
         "{far}"
     );
 }

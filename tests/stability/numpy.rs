@@ -47,7 +47,7 @@ fn every_permitted_pose_that_numpy_finds_is_found() {
         let (mut theirs, mut ours, mut missing) = (0, 0, vec![]);
         for (row, lengths) in lengths.iter().enumerate() {
             let modes = permitted_modes(machine, lengths);
-            ours += modes.len();
+            ours += modes.poses.len();
             for &[_, _, w, i, j, k, x, y, z] in
                 found.iter().filter(|it| it[..2] == [index as f64, row as f64])
             {
@@ -55,7 +55,7 @@ fn every_permitted_pose_that_numpy_finds_is_found() {
                 let pose =
                     Pose { rotation: rotation.to_rotation_matrix().into(), position: Vector3::new(x, y, z) };
                 theirs += 1;
-                if modes.iter().all(|mode| machine.joints.distance(mode.pose(), &pose) > 1e-6) {
+                if modes.poses.iter().all(|mode| machine.joints.distance(mode.pose(), &pose) > 1e-6) {
                     missing.push((lengths, pose));
                 }
             }

@@ -39,7 +39,7 @@ fn the_searched_poses_reach_the_edge_of_the_region() {
         let found = search(&machine, 200);
         let reach = found.largest_rotation_rad.to_degrees();
         assert!((least_deg..=most_deg).contains(&reach) && found.nearest.is_none(), "{name}: {found:?}");
-        assert!(found.to_string().starts_with("at home none found; in the usable region none found up to "));
+        assert!(found.to_string().starts_with("at home none (proved); in the usable region none found up to "));
         // Home alone, if it is not usable.
         assert_eq!(search(&machine.within_margin(machine.actuator.stroke()), 200).poses, 1);
     }
@@ -57,7 +57,7 @@ fn poses_with_another_permitted_pose_are_counted_and_hatched() {
         let poses = (0..table.rows.len()).map(|row| rigid(table.coordinates(row, "").into()));
         let usable: Vec<_> = poses.filter(|pose| clearance.violation_at(pose).is_none()).collect();
         let others = |pose: &&Pose| {
-            !other_permitted_modes(&machine, &KinematicState::new(&machine, **pose)).is_empty()
+            !other_permitted_modes(&machine, &KinematicState::new(&machine, **pose)).poses.is_empty()
         };
         let ambiguous = usable.iter().filter(others).count();
         let slice = &report["slices"][0];

@@ -94,7 +94,7 @@ impl CheckReport {
             self.rate_hz,
         )?;
         let Some(nearest) = &self.nearest_pose else {
-            writeln!(f, "other poses with these lengths    none found within 90 deg and 2 radii of home")?;
+            writeln!(f, "other poses with these lengths    none found within 90 deg of home")?;
             return self.fmt_search(f);
         };
         let count = self.other_poses;

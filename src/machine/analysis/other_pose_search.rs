@@ -1,7 +1,7 @@
 //! Ambiguous starts: rest poses of the usable region whose leg lengths another permitted pose has, too.
 //!
 //! A random walk from home visits the region: a step turns or shifts the platform within an interval, which shrinks until the pose is
-//! usable (R. M. Neal, Slice sampling, 2003). A search, without proof. The poses are the same in every run, and a longer search begins with
+//! usable (R. M. Neal, Slice sampling, 2003). [`super::assembly_proof`] decides each pose; poses in between are not searched. The poses are the same in every run, and a longer search begins with
 //! those of a shorter one.
 
 use core::f64::consts::PI;
@@ -40,6 +40,8 @@ pub struct OtherPoseSearch {
     pub largest_rotation_rad: f64,
     /// Smallest rotation from home of those with another permitted pose.
     pub ambiguous_from_rad: Option<f64>,
+    /// Whether it is proved that home has no other permitted pose than those found.
+    pub proved_at_home: bool,
     /// Nearest other permitted pose of home.
     pub at_home: Option<PoseDistance>,
     /// Nearest other permitted pose of any of these poses.
@@ -71,6 +73,7 @@ impl OtherPoseSearch {
             ambiguous_poses: ambiguous().count(),
             largest_rotation_rad: poses.iter().map(rotation).fold(0.0, f64::max),
             ambiguous_from_rad: ambiguous().map(|(pose, _)| rotation(pose)).min_by(f64::total_cmp),
+            proved_at_home: other_permitted_modes(machine, &KinematicState::new(machine, home)).are_all,
             at_home: found.first().copied().flatten(),
             nearest: nearest(found.into_iter().flatten()),
         }
@@ -89,7 +92,7 @@ fn nearest(found: impl Iterator<Item = PoseDistance>) -> Option<PoseDistance> {
 /// The nearest other permitted pose with the lengths of a pose.
 pub fn nearest_permitted(machine: &Machine, pose: &Pose) -> Option<PoseDistance> {
     let others = other_permitted_modes(machine, &KinematicState::new(machine, *pose));
-    nearest(others.iter().map(|other| {
+    nearest(others.poses.iter().map(|other| {
         let way = pose.displacement_to(other.pose());
         let distance = machine.joints.distance(pose, other.pose());
         PoseDistance { distance, rotation_rad: way.angular.norm(), shift_m: way.linear.norm() }
@@ -140,6 +143,7 @@ impl fmt::Display for OtherPoseSearch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.at_home {
             Some(other) => write!(f, "at home {other}; ")?,
+            None if self.proved_at_home => write!(f, "at home none (proved); ")?,
             None => write!(f, "at home none found; ")?,
         }
         let Self { poses, ambiguous_poses, .. } = self;
