@@ -8,7 +8,6 @@ mod dietmaier;
 mod fichter;
 mod gimbal;
 mod legs;
-mod numpy;
 mod passing;
 mod random;
 mod sampled;

@@ -1,11 +1,17 @@
 //! Random trials: how often each method finds the pose, and that ours is never deceived without notice.
 
+use std::collections::BTreeSet;
+
 use hexad::analysis::assembly_modes::{other_permitted_modes, permitted_modes};
 use hexad::model::forward_kinematics::{Tracker, TrackingResult};
 use hexad::model::sensitivity::Sensitivity;
+use hexad::motion::rotation_order::rotation_of;
 use hexad_support::certificate::Certificate;
+use hexad_support::not_run::lacking;
+use hexad_support::python::{environment, output};
 use hexad_support::stability::rivals::Update;
 use rayon::prelude::*;
+use serde_json::json;
 
 use super::*;
 
@@ -50,10 +56,19 @@ fn poses_far_from_home_are_found_where_others_fail() {
     assert!((0.85..0.97).contains(&angles[0]) && angles[2] > 0.01, "{angles:?}");
 }
 
+/// In the stroke, on the side of home and turned from it by no more than the joints permit, and conditioned well enough.
+fn is_permitted(machine: &Machine, pose: Pose, most_condition: f64) -> bool {
+    let [state, home] = [pose, machine.home_pose()].map(|pose| KinematicState::new(machine, pose));
+    let turn = home.pose().displacement_to(state.pose()).angular.norm();
+    let is_in_stroke = state.lengths(machine).iter().all(|length| machine.actuator.margin(*length) >= 0.0);
+    let Sensitivity { condition, determinant, .. } = *state.sensitivity();
+    let is_on_side = determinant * home.sensitivity().determinant > 0.0;
+    turn < machine.max_rotation && is_in_stroke && condition < most_condition && is_on_side
+}
+
 /// The first of 100,000 random poses that are in the stroke, as far from home as the joints permit, and well conditioned. `spread` is
 /// their largest turn about each axis \[rad\] and their largest shift in strokes, at most in radii.
-pub(super) fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec<[f64; 6]> {
-    let side = KinematicState::new(machine, machine.home_pose()).sensitivity().determinant;
+fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec<[f64; 6]> {
     let radius = machine.joints.radius;
     // Short strokes permit little of the rest.
     let share = (machine.actuator.stroke() / radius).min(1.0);
@@ -63,19 +78,11 @@ pub(super) fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec
         let away: Vec<_> = sizes.map(|size| size * random.signed()).collect();
         std::array::from_fn(|i| machine.home[i] + away[i])
     });
-    let is_permitted = |x: &[f64; 6]| {
-        let state = KinematicState::new(machine, rigid(*x));
-        let turn = machine.home_pose().displacement_to(state.pose()).angular.norm();
-        let is_in_stroke =
-            state.lengths(machine).iter().all(|length| machine.actuator.margin(*length) >= 0.0);
-        let Sensitivity { condition, determinant, .. } = *state.sensitivity();
-        turn < machine.max_rotation && is_in_stroke && condition < 100.0 && determinant * side > 0.0
-    };
-    drawn.filter(is_permitted).take(most).collect()
+    drawn.filter(|x| is_permitted(machine, rigid(*x), 100.0)).take(most).collect()
 }
 
 const NEAR: [f64; 2] = [0.1, 0.2];
-pub(super) const WIDE: [f64; 2] = [0.5, 1.5];
+const WIDE: [f64; 2] = [0.5, 1.5];
 
 fn is_missing(machine: &Machine, x: &[f64; 6]) -> bool {
     let truth = rigid(*x);
@@ -109,7 +116,7 @@ fn starts(name: &str, machine: &Machine, most: usize, spread: [f64; 2]) -> [usiz
 }
 
 /// With the joints moved, and a stroke around the lengths at home.
-pub(super) fn scattered(number: usize) -> Machine {
+fn scattered(number: usize) -> Machine {
     let mut machine = machine(MACHINES[number % MACHINES.len()]);
     let (mut random, mut legs) = (Random::new(number as u64), Legs::of(&machine));
     let size = 0.3 * machine.joints.radius;
@@ -177,6 +184,38 @@ fn the_true_pose_is_among_those_of_its_lengths_in_a_long_search() {
         let missing: Vec<_> = poses.par_iter().filter(|x| is_missing(&machine, x)).collect();
         println!("{name}: {} poses, {} missing", poses.len(), missing.len());
         assert!(missing.is_empty(), "{name}: {} of {}: {:?}", missing.len(), poses.len(), missing[0]);
+    }
+}
+
+/// Those that numpy finds from starts and with equations of its own.
+#[test]
+#[ignore = "second tier: needs PyPI"]
+fn every_permitted_pose_that_numpy_finds_is_found() {
+    let packages = ["numpy==2.3.5", "scipy==1.16.3"].map(String::from);
+    let Ok(python) = environment(&packages).inspect_err(|why| lacking(why)) else { return };
+    let (folder, script) = (TempDir::new().unwrap(), data("../stability/permitted_poses", "py"));
+    let file = folder.path().join("case.json");
+    let wide = |machine| Machine { max_rotation: f64::to_radians(50.0), ..machine };
+    let [fried, random] = [machine("fried2008"), scattered(9)].map(wide);
+    for machine in [fried, random, machine("motion_base"), machine("tsai2000"), scattered(0)] {
+        let (Legs { base, platform, .. }, home) = (Legs::of(&machine), machine.home_pose());
+        let poses = permitted(&machine, 200, WIDE);
+        let lengths: Vec<_> = poses.into_iter().map(|x| leg_lengths(&machine, &rigid(x))).collect();
+        let arms = platform.map(|arm| home.rotation * arm);
+        let case = json!([base, arms, home.position, machine.max_rotation, lengths]);
+        fs::write(&file, case.to_string()).unwrap();
+        let theirs = output(Command::new(python.join("bin/python")).arg(&script).arg(&file)).unwrap();
+        let ours: Vec<_> = lengths.iter().map(|lengths| permitted_modes(&machine, lengths).poses).collect();
+        let (mut common, count) = (BTreeSet::new(), ours.iter().flatten().count());
+        for [row, w, i, j, k, x, y, z] in serde_json::from_str::<Vec<[f64; 8]>>(&theirs).unwrap() {
+            let rotation = rotation_of([w, i, j, k]) * home.rotation;
+            let (row, pose) = (row as usize, Pose { rotation, position: Vector3::new(x, y, z) });
+            let own = ours[row].iter().position(|own| machine.joints.distance(own.pose(), &pose) < 1e-6);
+            assert!(own.is_some() || !is_permitted(&machine, pose, 1e4), "{:?}: {pose:?}", lengths[row]);
+            common.extend(own.map(|own| (row, own)));
+        }
+        println!("{} rows, {count} poses, {} also of numpy", lengths.len(), common.len());
+        assert!(lengths.len() == 200 && common.len() * 50 >= count * 49);
     }
 }
 

@@ -33,6 +33,7 @@ impl fmt::Display for CheckReport {
             )?;
         }
         self.fmt_modes(f)?;
+        writeln!(f, "other permitted poses             {}", self.other_pose_search)?;
         self.fmt_loops(f)?;
         writeln!(f, "{}", self.motion_limits)?;
         self.derived_limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
@@ -94,8 +95,7 @@ impl CheckReport {
             self.rate_hz,
         )?;
         let Some(nearest) = &self.nearest_pose else {
-            writeln!(f, "other poses with these lengths    none found within 90 deg of home")?;
-            return self.fmt_search(f);
+            return writeln!(f, "other poses with these lengths    none found within 90 deg of home");
         };
         let count = self.other_poses;
         writeln!(f, "other poses with these lengths    {count} found, the nearest {}", nearest.text)?;
@@ -113,11 +113,7 @@ impl CheckReport {
                 "WARNING: home.max_rotation_deg permits {count} of them: control begins at home only after hexad engage --pose N"
             )?;
         }
-        self.fmt_search(f)
-    }
-
-    fn fmt_search(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "other permitted poses             {}", self.other_pose_search)
+        Ok(())
     }
 }
 

@@ -138,15 +138,15 @@ impl MapDrawing<'_> {
 }
 
 /// A line through each row of neighbours with another permitted pose.
-fn hatch(slice: &Slice) -> impl Iterator<Item = MapLine> {
-    let (step, half) = (slice.search_step, 0.5 * slice.search_step as f64);
-    let runs = slice.ambiguous.chunk_by(move |[left, up], next| *next == [left + step, *up]);
+fn hatch(slice: &Slice) -> Vec<MapLine> {
+    let (step, ambiguous) = (slice.search_step, slice.ambiguous().collect::<Vec<_>>());
     let sample = (rgb(AMBIGUOUS_COLOR).stroke_width(15), "another permitted pose, same lengths");
-    runs.filter_map(move |run| {
-        let ([[first, up], ..], [.., [last, _]]) = (run, run) else { return None };
-        let ends = [*first as f64 - half, *last as f64 + half];
-        Some((sample, ends.map(|right| on_axes(slice, (right, *up as f64))).into()))
-    })
+    let line = |run: &[[usize; 2]]| {
+        let ends = [(run.first()?, -0.5), (run.last()?, 0.5)];
+        let at = |([right, up], side): (&[usize; 2], f64)| (*right as f64 + side * step as f64, *up as f64);
+        Some((sample, ends.map(|end| on_axes(slice, at(end))).into()))
+    };
+    ambiguous.chunk_by(|[left, up], next| *next == [left + step, *up]).filter_map(line).collect()
 }
 
 /// A position in the units of the axes: metres and degrees.

@@ -104,8 +104,8 @@ impl SliceReport {
             poses: slice.qualities.len(),
             in_reach: in_reach.count(),
             usable: usable.len(),
-            searched: slice.searched,
-            ambiguous: slice.ambiguous.len(),
+            searched: slice.searched.len(),
+            ambiguous: slice.ambiguous().count(),
             largest_margin_m,
             condition: ends(|quality| quality.condition),
             worst_force_n: ends(|quality| quality.worst_force),
@@ -247,11 +247,8 @@ impl fmt::Display for WorkspaceReport {
             [format!("  {}", range.axis), format!("{low} to {high} {unit}")]
         });
         write!(f, "\n{}", text_table(2, &[("box", Left), ("offset from home", Right)], rows))?;
-        writeln!(
-            f,
-            "\n{}",
-            paragraph("other permitted poses: ", &self.other_pose_search.to_string(), HINT_WIDTH)
-        )?;
+        let search = self.other_pose_search.to_string();
+        writeln!(f, "\n{}", paragraph("other permitted poses: ", &search, HINT_WIDTH))?;
         self.files.iter().try_for_each(|path| writeln!(f, "written: {}", path.display()))
     }
 }

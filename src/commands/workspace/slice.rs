@@ -80,10 +80,9 @@ pub struct Slice {
     /// Poses along each axis.
     pub count: usize,
     pub qualities: Vec<PoseQuality>,
-    /// Steps between poses that are searched for other permitted poses, the number of searched ones, and the indices of those with another.
+    /// Steps between poses that are searched for other permitted poses; their indices, and whether there is one.
     pub search_step: usize,
-    pub searched: usize,
-    pub ambiguous: Vec<[usize; 2]>,
+    pub searched: Vec<([usize; 2], bool)>,
 }
 
 impl Slice {
@@ -103,8 +102,7 @@ impl Slice {
             count: COARSE_POSES,
             qualities: vec![],
             search_step: 1,
-            searched: 0,
-            ambiguous: vec![],
+            searched: vec![],
         };
         slice.ranges = slice.range_of_reach(workspace, machine);
         slice.count = count;
@@ -120,11 +118,14 @@ impl Slice {
         let pose = |places: &[usize; 2]| TaskState::at_rest(self.x(*places)).motion().pose;
         let all = indices().flat_map(|up| indices().map(move |right| [right, up]));
         let usable: Vec<_> = all.filter(|places| clearance.violation_at(&pose(places)).is_none()).collect();
-        let searched = usable.len();
-        let is_ambiguous = |places: &[usize; 2]| nearest_permitted(machine, &pose(places)).is_some();
-        let ambiguous = usable.into_par_iter().filter(is_ambiguous).collect();
-        (self.searched, self.ambiguous) = (searched, ambiguous);
+        let search = |places: [usize; 2]| (places, nearest_permitted(machine, &pose(&places)).is_some());
+        self.searched = usable.into_par_iter().map(search).collect();
         self
+    }
+
+    /// Indices of the searched poses with another permitted pose.
+    pub fn ambiguous(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.searched.iter().filter(|(_, has_other)| *has_other).map(|(places, _)| *places)
     }
 
     /// X of a pose by its indices along both axes.

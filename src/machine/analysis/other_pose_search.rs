@@ -141,24 +141,16 @@ impl fmt::Display for PoseDistance {
 
 impl fmt::Display for OtherPoseSearch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.at_home {
-            Some(other) => write!(f, "at home {other}; ")?,
-            None if self.proved_at_home => write!(f, "at home none (proved); ")?,
-            None => write!(f, "at home none found; ")?,
-        }
-        let Self { poses, ambiguous_poses, .. } = self;
-        match (&self.nearest, self.ambiguous_from_rad) {
-            (Some(nearest), Some(from)) => write!(
-                f,
-                "in the usable region from {nearest} on; starts are ambiguous from {} deg of rotation of home on \
-                 (searched, {ambiguous_poses} of {poses} poses)",
-                significant(from.to_degrees())
-            ),
-            _ => write!(
-                f,
-                "in the usable region none found up to {} deg (searched, {poses} poses)",
-                significant(self.largest_rotation_rad.to_degrees())
-            ),
-        }
+        let deg = |rad: f64| significant(rad.to_degrees());
+        let none = if self.proved_at_home { "none (proved)" } else { "none found" };
+        let at_home = self.at_home.map_or(none.into(), |other| other.to_string());
+        write!(f, "at home {at_home}; in the usable region ")?;
+        let Self { poses, ambiguous_poses, largest_rotation_rad, .. } = self;
+        let (Some(nearest), Some(from)) = (&self.nearest, self.ambiguous_from_rad.map(deg)) else {
+            let most = deg(*largest_rotation_rad);
+            return write!(f, "none found up to {most} deg (searched, {poses} poses)");
+        };
+        write!(f, "from {nearest} on; some starts are ambiguous from {from} deg of rotation of home on ")?;
+        write!(f, "(searched, {ambiguous_poses} of {poses} poses)")
     }
 }
