@@ -88,7 +88,7 @@ fn search(machine: &Machine, gate: &PoseGate, here: &KinematicState, found: u32)
     if !others.poses.is_empty() {
         warn!("several poses have the measured leg lengths, so control does not begin: {list}");
     } else if others.are_all {
-        info!("no other pose has the measured leg lengths: proved");
+        info!("no other permitted pose has the measured leg lengths: proved");
     } else {
         info!(
             "no other pose with the measured leg lengths was found: searched without proof, as a singular pose has nearly these lengths"

@@ -18,12 +18,14 @@ fn a_daemon_remarks_on_its_loop_its_model_and_its_first_pose() {
     let control = "[control]\nmode = \"feedforward_joint_pd\"\nposition_bandwidth_hz = 28.724\nposition_damping_ratio = 3.0\n\
                    disturbance_m_s2_per_sqrt_s = 500.0\nfidelity = \"auto\"\n";
     let bold = Machine::with("remarks", control);
-    let daemon = start_daemon(&bold);
+    let (plant, daemon) = (start_plant(&bold), start_daemon(&bold));
     daemon.says(
         "WARN control.position_bandwidth_hz = 28.724: legs loop: with 2.10 periods of delay it is stable with",
     );
     daemon.says("fidelity: leaving out spin of the legs costs ");
+    daemon.says("INFO no other permitted pose has the measured leg lengths: proved");
     daemon.stops();
+    plant.stops();
 
     let machine = Machine::patient("remarks");
     let text = fs::read_to_string(&machine.file).expect("the machine file");
