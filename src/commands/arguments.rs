@@ -81,11 +81,9 @@ pub struct TableFiles {
 
 /// Parser of the names of built-in motions.
 pub fn built_in_motion() -> impl TypedValueParser<Value = BuiltInMotion> {
-    let names = BuiltInMotion::ALL.map(BuiltInMotion::name_and_description);
-    let values = names.map(|(name, description)| PossibleValue::new(name).help(description));
-    PossibleValuesParser::new(values).map(|name| {
-        BuiltInMotion::ALL.into_iter().find(|motion| motion.name() == name).unwrap_or(BuiltInMotion::Settle)
-    })
+    let value = |motion: BuiltInMotion| PossibleValue::new(motion.name()).help(motion.description());
+    PossibleValuesParser::new(BuiltInMotion::ALL.map(value))
+        .map(|name| BuiltInMotion::by_name(&name).unwrap_or(BuiltInMotion::Settle))
 }
 
 /// Duration \[s\] of a motion, a wait or a measurement.

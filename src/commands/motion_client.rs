@@ -120,7 +120,7 @@ impl<'a> MotionClient<'a> {
     /// The status of the daemon. An error if the platform is not under control.
     pub fn status_under_control(&mut self) -> Result<AnswerLine, MotionError> {
         let answer = self.ask(&RequestLine::new("status"))?;
-        let follows = State::ALL.into_iter().any(|it| it.follows() && it.name() == answer.state);
+        let follows = State::by_name(&answer.state).is_some_and(State::follows);
         let AnswerLine { state, text, .. } = &answer;
         let ended = || MotionError::Failed(format!("control has ended: the daemon is in {state}: {text}"));
         if follows { Ok(answer) } else { Err(ended()) }

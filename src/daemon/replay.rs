@@ -114,7 +114,7 @@ pub fn recorded_config(info: &RunInfo, level: Level) -> Result<Config, ConfigErr
 
 /// Controller with the recorded configuration.
 pub fn recorded_controller(info: &RunInfo, config: &Config) -> Controller {
-    let recorded = Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == info.fidelity);
+    let recorded = Fidelity::by_name(&info.fidelity);
     let fidelity = recorded.unwrap_or_else(|| fidelity::fidelity(config));
     Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }

@@ -164,7 +164,7 @@ impl RequestLine {
 
     /// The request to the controller; `None` if it is not for the controller, or unknown.
     pub fn controller_request(&self) -> Option<Request> {
-        Request::ALL.into_iter().find(|request| request.name() == self.request)
+        Request::by_name(&self.request)
     }
 
     /// Whether it ends control or force.

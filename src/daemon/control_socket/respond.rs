@@ -62,7 +62,7 @@ impl Server<'_> {
                 CONFIRM_LEGS => self.confirm_legs(connection, request, line, snapshot),
                 name if MotionOrder::is_named(name) => self.begin_motion(connection, request, line, snapshot),
                 other => {
-                    if let Some(order) = RideOrder::ALL.into_iter().find(|it| it.name() == other) {
+                    if let Some(order) = RideOrder::by_name(other) {
                         return self.begin_ride(connection, request, line, order, snapshot);
                     }
                     let names = Request::ALL.map(Request::name).join(", ");

@@ -198,7 +198,7 @@ impl DatagramFormat {
 
     fn parse(text: &str) -> Result<Self, String> {
         let file: FormatFile = toml::from_str(text).map_err(|error| toml_error(text, &error))?;
-        let order = RotationOrder::ALL.into_iter().find(|order| order.name() == file.rotation);
+        let order = RotationOrder::by_name(&file.rotation);
         let order = order.ok_or("rotation must be xyz, xzy, yxz, yzx, zxy or zyx")?;
         let separator = match (file.encoding, file.separator.as_deref()) {
             (Encoding::Text, Some("space")) => ' ',
