@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
+use hexad_client::operator::protocol::RequestLine;
 use hexad_core::motion::built_in::BuiltInMotion;
 use hexad_machine::config::{Config, ConfigError};
 use hexad_machine::text::csv_table::GROUPS;
@@ -59,6 +60,23 @@ pub struct OptionalMachineFile {
 impl OptionalMachineFile {
     pub fn path(&self) -> Option<&Path> {
         self.argument.as_deref().or(self.option.as_deref())
+    }
+}
+
+#[derive(Clone, Copy, Debug, Args)]
+pub struct EngageOptions {
+    /// Take control, if the platform is not under control
+    #[arg(long)]
+    engage: bool,
+    /// Longest to wait for control [s]
+    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
+    within: f64,
+}
+
+impl EngageOptions {
+    /// A request of a motion with these options.
+    pub fn line(self, request: &str) -> RequestLine {
+        RequestLine { engage: self.engage, within_s: self.within, ..RequestLine::new(request) }
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::arguments::MachineFile;
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use super::frame_options::{FrameOptions, UnitOptions};
 use super::machine_file::{difference, with_frame, write_new};
 use hexad_client::operator::requests::status;
@@ -65,21 +65,6 @@ struct SetArguments {
     output: PathBuf,
 }
 
-/// Reason why no frame is set.
-#[derive(Debug, thiserror::Error)]
-enum FrameError {
-    #[error("{place}: no frame is named {name:?}; --kind tool or --kind work makes a new one")]
-    Unknown { place: String, name: String },
-    #[error(
-        "{place}: {name:?} is a {kind} frame, not a {wanted} frame; choose another name, or leave out --kind"
-    )]
-    Mismatch { place: String, name: String, kind: FrameKind, wanted: FrameKind },
-    #[error("a {kind} frame is set from a {other} frame: --{kind} must be left out")]
-    NotUsed { kind: FrameKind, other: FrameKind },
-}
-
-impl CommandError for FrameError {}
-
 impl FrameArguments {
     pub fn execute(self) -> Result<(), Failure> {
         match self.action {
@@ -110,25 +95,31 @@ impl SetArguments {
     }
 
     /// Kind of the frame of the file with this name, else of the option.
-    fn kind(&self, config: &Config) -> Result<FrameKind, FrameError> {
-        let (place, name) = (config.place.clone(), self.name.clone());
-        let found = config.frames.iter().find(|frame| frame.name == name).map(|frame| frame.kind);
+    fn kind(&self, config: &Config) -> Result<FrameKind, Failure> {
+        let (place, name) = (&config.place, &self.name);
+        let found = config.frames.iter().find(|frame| frame.name == *name).map(|frame| frame.kind);
         let kind = match (found, self.kind) {
             (Some(kind), Some(wanted)) if kind != wanted => {
-                return Err(FrameError::Mismatch { place, name, kind, wanted });
+                return Err(Failure::before_start(format_args!(
+                    "{place}: {name:?} is a {kind} frame, not a {wanted} frame; choose another name, or leave out --kind"
+                )));
             }
-            (None, None) => return Err(FrameError::Unknown { place, name }),
+            (None, None) => {
+                return Err(Failure::before_start(format_args!(
+                    "{place}: no frame is named {name:?}; --kind tool or --kind work makes a new one"
+                )));
+            }
             (Some(kind), _) | (None, Some(kind)) => kind,
         };
-        match (kind, &self.frames) {
-            (FrameKind::Tool, FrameOptions { tool: Some(_), .. }) => {
-                Err(FrameError::NotUsed { kind, other: FrameKind::Work })
-            }
-            (FrameKind::Work, FrameOptions { work: Some(_), .. }) => {
-                Err(FrameError::NotUsed { kind, other: FrameKind::Tool })
-            }
-            _ => Ok(kind),
+        let (unused, other) = match kind {
+            FrameKind::Tool => (&self.frames.tool, FrameKind::Work),
+            FrameKind::Work => (&self.frames.work, FrameKind::Tool),
+        };
+        if unused.is_some() {
+            let text = format!("a {kind} frame is set from a {other} frame: --{kind} must be left out");
+            return Err(Failure::before_start(text));
         }
+        Ok(kind)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use super::failure::{CommandError, INTERRUPTED, default_exit_code};
+use super::failure::{CommandError, INTERRUPTED};
 use hexad_client::operator::OperatorError;
 use hexad_client::operator::connection::Connection;
 use hexad_client::operator::motion_fields::HOLD;
@@ -39,18 +39,12 @@ pub enum MotionError {
 }
 
 impl CommandError for MotionError {
-    fn has_begun(&self) -> bool {
-        match self {
-            Self::Operator(error) => error.has_begun(),
-            Self::Invalid(_) => false,
-            _ => true,
-        }
-    }
-
     fn exit_code(&self) -> u8 {
         match self {
+            Self::Operator(error) => error.exit_code(),
+            Self::Invalid(_) => 2,
             Self::Interrupted | Self::InterruptedEarly => INTERRUPTED,
-            _ => default_exit_code(self),
+            _ => 1,
         }
     }
 }

@@ -7,8 +7,9 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use super::receiver::{Arrived, Receiver, SILENCE_CAUSES};
-use super::stream::{BLEND_S, StreamError, StreamOptions, blended, seconds};
+use super::stream::{BLEND_S, StreamOptions, blended, seconds};
 use super::survey::StreamSurvey;
+use crate::commands::failure::Failure;
 use crate::commands::progress::time_bar;
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use hexad_client::realtime::stop_request::Stop;
@@ -40,12 +41,12 @@ pub fn run(
     options: &StreamOptions,
     duration_s: f64,
     stop: &Stop,
-) -> Result<(), StreamError> {
+) -> Result<(), Failure> {
     let mut receiver = Receiver::open(config, address, options)?;
     let arrived = receive(&mut receiver, duration_s, stop);
     let (Some(first), Some(last)) = (arrived.first(), arrived.last()) else {
         let causes = if receiver.is_silent() { format!(": {SILENCE_CAUSES}") } else { String::new() };
-        return Err(StreamError::Silence(receiver.description() + &causes));
+        return Err(Failure::after_start(receiver.description() + &causes));
     };
     let constants = constants(config);
     let mut survey = StreamSurvey::over(duration_s);
@@ -72,7 +73,7 @@ pub fn run(
         let _ = writeln!(text, "{}", path.display());
     }
     print(text)?;
-    survey.doubt().map_or(Ok(()), |doubt| Err(StreamError::Silence(doubt)))
+    survey.doubt().map_or(Ok(()), |doubt| Err(Failure::after_start(doubt)))
 }
 
 fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived> {
@@ -197,7 +198,7 @@ impl Followed {
         )
     }
 
-    fn draw(&self, path: &Path, config: &Config) -> Result<(), StreamError> {
+    fn draw(&self, path: &Path, config: &Config) -> Result<(), Failure> {
         let home = config.machine.home;
         let lines: Vec<_> = (0..AXES.len())
             .map(|k| {
