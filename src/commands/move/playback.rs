@@ -13,6 +13,7 @@ use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad_core::control::signals::limits::Limits;
 use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::timeline::Timeline;
 use hexad_daemon::rate_change::RateChange;
@@ -174,7 +175,7 @@ impl<'a> Playback<'a> {
     }
 
     fn slowing(&self, path: Path, since_ns: u64, now_ns: u64) -> Phase {
-        let t = seconds(since_ns, now_ns);
+        let t = seconds_since(since_ns, now_ns);
         let slowdown = RateChange::to_rest(t, &self.limits, |t| path.at(t, self.trajectory));
         let then = if self.is_ending { "once more ends at once" } else { "hexad move --resume goes on" };
         info!("slowing down along the path, within {:.1} s; {then}", slowdown.duration_s);
@@ -278,7 +279,7 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Playing(path, since_ns) => {
-                let t = seconds(*since_ns, now_ns);
+                let t = seconds_since(*since_ns, now_ns);
                 let task = path.at(t, self.trajectory);
                 match path.has_ended(t) {
                     true if self.is_to_hold => self.phase = Phase::Holding(task, now_ns),
@@ -288,7 +289,7 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Slowing(path, slowdown, since_ns) => {
-                let since_s = seconds(*since_ns, now_ns);
+                let since_s = seconds_since(*since_ns, now_ns);
                 let task = slowdown.at(since_s, |t| path.at(t, self.trajectory));
                 if slowdown.has_ended(since_s) {
                     self.phase = if self.is_ending {
@@ -365,8 +366,4 @@ impl<'a> Playback<'a> {
 fn ended(state: State, reason: &Diagnostic) -> Failure {
     let state = state.name();
     Failure::after_start(format_args!("the motion has ended: the daemon is in {state}: {reason}"))
-}
-
-fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }

@@ -20,6 +20,7 @@ use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad_core::control::signals::limits::DerivativeLimits;
 use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::rigid::Twist;
 use hexad_core::model::task::{TaskState, pose_of, task_coordinates};
 use hexad_machine::analysis::target_motion::{REACHED_M, REACHED_RAD, check_target};
@@ -168,14 +169,14 @@ impl<'a, F: Feed> TargetSource<'a, F> {
         let of = |observation: &Observation| Some(pose_of(&observation.reference?));
         let now = of(newest).ok_or_else(|| TargetError::UnknownPose(newest.text.as_str().into()))?;
         let earlier = before.and_then(|before| {
-            let interval_s = seconds(before.time_ns, newest.time_ns);
+            let interval_s = seconds_since(before.time_ns, newest.time_ns);
             Some((of(before)?, interval_s))
                 .filter(|_| interval_s > 0.0 && interval_s < MAX_INTERVAL_S && newest.state.has_control())
         });
         let Some((then, interval_s)) = earlier else { return self.present_x() };
         let moved = then.displacement_to(&now);
         let limits = &constants.parameters.limits;
-        let age_s = seconds(newest.time_ns, monotonic_ns());
+        let age_s = seconds_since(newest.time_ns, monotonic_ns());
         let ahead = |moved: Vector3<f64>, limits: &DerivativeLimits| {
             let DerivativeLimits { acceleration, jerk, .. } =
                 limits.scaled(constants.parameters.limits.autonomous_scale);
@@ -263,8 +264,4 @@ impl<'a, F: Feed> TargetSource<'a, F> {
 pub fn has_received(observation: &Observation, x: &[f64; 6]) -> bool {
     let is_same = |received: [f64; 6]| received.iter().zip(x).all(|(a, b)| (a - b).abs() < SAME);
     observation.setpoint.is_some_and(is_same)
-}
-
-fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }

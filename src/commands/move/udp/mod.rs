@@ -17,7 +17,7 @@ use tracing::{info, warn};
 
 use self::receiver::{Arrived, Receiver};
 use self::status_feed::StatusFeed;
-use self::stream::{BLEND_S, StreamOptions, seconds};
+use self::stream::{BLEND_S, StreamOptions};
 use self::survey::StreamSurvey;
 use super::{PlaybackOptions, no_signals};
 use crate::commands::failure::Failure;
@@ -30,6 +30,7 @@ use hexad_client::realtime::pause_signals::PauseRequest;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::constants::Constants;
 use hexad_core::control::parameters::ViolationPolicy;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::task::pose_of;
 use hexad_daemon::constants;
 use hexad_daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
@@ -178,7 +179,7 @@ impl Ride<'_> {
                     self.board(RESTARTED);
                 } else if self.receiver.is_alive(now_ns) {
                     self.phase = Phase::following(x);
-                } else if seconds(since_ns, now_ns) > LONG_PAUSE_S {
+                } else if seconds_since(since_ns, now_ns) > LONG_PAUSE_S {
                     self.board("a long pause");
                 }
             }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::commands::quantity::{angle, length, list};
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::motion::minimum_jerk::{rise, straight_move};
 
 /// Duration of the blend from the pose at which the platform stands to the stream \[s\].
@@ -36,9 +37,5 @@ fn boarding(text: &str) -> Result<[f64; 6], String> {
 
 /// A pose of the stream, blended from the pose at which the platform stood.
 pub fn blended(from: &[f64; 6], to: &[f64; 6], since_ns: u64, now_ns: u64) -> [f64; 6] {
-    straight_move(&(*from).into(), &(*to).into(), &rise(seconds(since_ns, now_ns), BLEND_S)).x.into()
-}
-
-pub fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+    straight_move(&(*from).into(), &(*to).into(), &rise(seconds_since(since_ns, now_ns), BLEND_S)).x.into()
 }
