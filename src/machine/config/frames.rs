@@ -101,7 +101,6 @@ pub(super) fn read(root: &mut SectionReader) -> Vec<NamedFrame> {
                 "must have angles in [-2 pi, 2 pi]: alpha, beta, gamma [rad], then x, y, z [m]",
             );
         }
-        reader.finish();
         frames.push(NamedFrame { name, kind, x });
     }
     frames
