@@ -34,12 +34,12 @@ pub fn edited(text: &str, values: &[NewValue]) -> Result<String, Failure> {
     for new in values {
         let is_finite = |estimate: &Estimate| estimate.value.is_finite() && estimate.deviation.is_finite();
         if !new.value.estimates().iter().all(is_finite) {
-            let key = new.path.join(".");
+            let key = &new.key;
             return Err(Failure::before_start(format_args!(
                 "estimate of {key} must be finite; keep the old value"
             )));
         }
-        set(document.as_table_mut(), new.path, new, false)?;
+        set(document.as_table_mut(), &new.key, new, false)?;
     }
     written(text, &document)
 }
@@ -86,29 +86,24 @@ fn wrong_type(key: &str, found: &str, expected: &str) -> Failure {
 type Changed = Option<Option<String>>;
 
 /// Sets the value at the end of a path below a table, with the comment behind the outermost value.
-fn set(
-    table: &mut dyn TableLike,
-    path: &[&str],
-    new: &NewValue,
-    is_inline: bool,
-) -> Result<Changed, Failure> {
-    let Some((name, below)) = path.split_first() else { return Ok(None) };
-    let of_type = |found: &Item, expected| wrong_type(&new.path.join("."), found.type_name(), expected);
+fn set(table: &mut dyn TableLike, path: &str, new: &NewValue, is_inline: bool) -> Result<Changed, Failure> {
+    let (name, below) = path.split_once('.').unwrap_or((path, ""));
+    let of_type = |found: &Item, expected| wrong_type(&new.key, found.type_name(), expected);
     let is_new = !table.contains_key(name);
     if is_new {
         insert(table, name, !below.is_empty(), new, is_inline);
     }
     let Some(item) = table.get_mut(name) else { return Ok(None) };
     let changed = match below {
-        [] if is_new => Some(None),
-        [] => replace(item, new).ok_or_else(|| of_type(item, NUMERIC))?,
+        "" if is_new => Some(None),
+        "" => replace(item, new).ok_or_else(|| of_type(item, NUMERIC))?,
         _ => {
             let (is_inline, of_value) = (item.is_inline_table(), of_type(item, "a table"));
             set(item.as_table_like_mut().ok_or(of_value)?, below, new, is_inline)?
         }
     };
     if let (Some(old), Some(value), false) = (&changed, item.as_value_mut(), is_inline) {
-        comment(value.decor_mut(), &below.join("."), old.clone(), new);
+        comment(value.decor_mut(), below, old.clone(), new);
     }
     Ok(changed)
 }
@@ -176,10 +171,10 @@ fn number(value: &Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|x| x as f64))
 }
 
-/// Whether a machine file has a table at a path.
-pub fn has_table(text: &str, path: &[&str]) -> bool {
+/// Whether a machine file has a table at a key.
+pub fn has_table(text: &str, key: &str) -> bool {
     let document = parsed(text).unwrap_or_default();
-    path.iter().try_fold(document.as_item(), |item, key| item.get(key)).is_some_and(Item::is_table_like)
+    key.split('.').try_fold(document.as_item(), |item, key| item.get(key)).is_some_and(Item::is_table_like)
 }
 
 fn comment(decor: &mut Decor, key: &str, old: Option<String>, new: &NewValue) {
