@@ -12,7 +12,7 @@ use hexad_client::operator::requests::status;
 use hexad_core::model::rigid::Pose;
 use hexad_core::model::task::{pose_of, task_coordinates};
 use hexad_core::motion::frames::Frames;
-use hexad_daemon::target_source::{Observation, TargetError};
+use hexad_daemon::target_source::{Observation, TargetError, reason};
 use hexad_machine::config::Config;
 use hexad_machine::config::frames::{FrameKind, NamedFrame};
 use hexad_machine::text::coordinate_rows::CoordinateFormat;
@@ -83,9 +83,8 @@ impl SetArguments {
         let frames = config.frames_named(self.frames.tool.as_deref(), self.frames.work.as_deref())?;
         let answer = status(&config.name)?;
         let seen = Observation::of_answer(&answer, 0, &config.machine.home);
-        let here = seen
-            .and_then(|seen| seen.reference)
-            .ok_or(TargetError::UnknownPose(answer.text.as_str().into()))?;
+        let here =
+            seen.and_then(|seen| seen.reference).ok_or(TargetError::UnknownPose(reason(&answer.text)))?;
         let x = task_coordinates(&frame_here(&frames, kind, &pose_of(&here)), &[0.0; 6]);
         let text = with_frame(&config.text, &NamedFrame { name: self.name, kind, x })?;
         Config::parse(&text, "the new machine file")?;

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-pub use self::error::{Deviation, TargetError};
+pub use self::error::{Deviation, TargetError, reason};
 pub use self::observation::Observation;
 use super::nanoseconds;
 use super::process_names::named;
@@ -114,8 +114,8 @@ pub struct TargetSource<'a, F> {
     published: Option<([f64; 6], u64)>,
     /// Instant at which the source was opened \[ns\].
     began_ns: u64,
-    /// Share of the limits of autonomous motions.
-    speed: f64,
+    /// Share of the limits of autonomous motions with which the next targets are approached.
+    pub speed: f64,
 }
 
 impl<'a, F: Feed> TargetSource<'a, F> {
@@ -127,7 +127,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
         let (now, _) = feed.observe()?;
         let is_active = now.state == State::Active;
         if !is_active && !may_engage {
-            return Err(TargetError::NotInControl(now.state, now.text.as_str().into()));
+            return Err(TargetError::NotInControl(now.state, reason(&now.text)));
         }
         let mut setpoints: Publisher<SetpointMessage> = bus.publisher()?;
         setpoints.begin_epoch();
@@ -146,11 +146,6 @@ impl<'a, F: Feed> TargetSource<'a, F> {
         })
     }
 
-    /// Sets the share of the limits of autonomous motions with which the next targets are approached.
-    pub fn set_speed(&mut self, speed: f64) {
-        self.speed = speed;
-    }
-
     /// Instant since which the platform follows \[ns\].
     pub fn active_since_ns(&self) -> Option<u64> {
         self.active_since_ns
@@ -159,7 +154,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     /// X of the reference or of the platform now.
     pub fn present_x(&mut self) -> Result<[f64; 6], TargetError> {
         let (now, _) = self.feed.observe()?;
-        now.reference.ok_or_else(|| TargetError::UnknownPose(now.text.as_str().into()))
+        now.reference.ok_or_else(|| TargetError::UnknownPose(reason(&now.text)))
     }
 
     /// X at which the platform comes to rest if it brakes now with the limits of autonomous motions. The
@@ -167,7 +162,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     pub fn resting_x(&mut self, constants: &Constants) -> Result<[f64; 6], TargetError> {
         let (newest, before) = self.feed.observe()?;
         let of = |observation: &Observation| Some(pose_of(&observation.reference?));
-        let now = of(newest).ok_or_else(|| TargetError::UnknownPose(newest.text.as_str().into()))?;
+        let now = of(newest).ok_or_else(|| TargetError::UnknownPose(reason(&newest.text)))?;
         let earlier = before.and_then(|before| {
             let interval_s = seconds_since(before.time_ns, newest.time_ns);
             Some((of(before)?, interval_s))
@@ -249,7 +244,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
             return Ok(());
         }
         if !now.state.follows() {
-            return Err(TargetError::Ended(now.state, now.text.as_str().into()));
+            return Err(TargetError::Ended(now.state, reason(&now.text)));
         }
         // An older observation has another setpoint.
         let is_late = monotonic_ns().saturating_sub(published_ns.max(since_ns)) > FOLLOWING_LIMIT_NS;
