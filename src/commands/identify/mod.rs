@@ -115,7 +115,7 @@ impl IdentifyArguments {
         }
         let Some(path) = &self.output else { return Ok(()) };
         let mut new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
-        let verdict = report.verdict();
+        let verdict = &report.verdict;
         if !verdict.holds && !self.force {
             let (cause, remedy) = verdict.first();
             return Err(Failure::after_start(format_args!(

@@ -66,7 +66,7 @@ impl ViewArguments {
                 let cycles = topics.cycles();
                 if !cycles.is_empty() {
                     let mut live = live.lock().unwrap_or_else(PoisonError::into_inner);
-                    live.set_times(&topics.statistics.total);
+                    live.times = topics.statistics.total;
                     cycles.iter().for_each(|(cycle, status)| live.add(cycle, status));
                 }
                 sleep(POLL_INTERVAL);
