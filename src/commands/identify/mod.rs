@@ -1,6 +1,6 @@
 //! `hexad identify`: parameters of a machine from recordings of its motions, and a new machine file with them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -72,6 +72,16 @@ fn too_little() -> Failure {
     )
 }
 
+/// Why no file is written.
+fn does_not_hold(path: &Path, verdict: &Verdict) -> Failure {
+    let (cause, remedy) = verdict.first();
+    Failure::after_start(format_args!(
+        "{}: not written, because the model does not hold; most likely {cause}: {remedy}, and record again; --force writes the \
+         file nevertheless",
+        path.display()
+    ))
+}
+
 impl IdentifyArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let mut recorded = Recorded::default();
@@ -117,12 +127,7 @@ impl IdentifyArguments {
         let mut new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
         let verdict = &report.verdict;
         if !verdict.holds && !self.force {
-            let (cause, remedy) = verdict.first();
-            return Err(Failure::after_start(format_args!(
-                "{path}: not written, because the model does not hold; most likely {cause}: {remedy}, and record again; --force \
-                 writes the file nevertheless",
-                path = path.display()
-            )));
+            return Err(does_not_hold(path, verdict));
         }
         if !verdict.holds {
             new.insert_str(0, &verdict.comment());

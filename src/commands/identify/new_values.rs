@@ -20,7 +20,8 @@ const RESIDUALS: f64 = 3.0;
 const CENTER: &str = "platform.center_of_mass_m";
 
 /// Transverse inertia of a link: its key, and the link.
-const ACROSS: [(&str, fn(&Machine) -> &Link); 2] = [
+type Across = (&'static str, fn(&Machine) -> &Link);
+const ACROSS: [Across; 2] = [
     ("cylinder.transverse_inertia_kg_m2", |machine| &machine.cylinder),
     ("rod.transverse_inertia_kg_m2", |machine| &machine.rod),
 ];
