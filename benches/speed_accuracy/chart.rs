@@ -111,7 +111,7 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
     }
     let mut items = vec![];
     for ((method, isa), rows) in methods {
-        let fidelity = Fidelity::ALL.iter().any(|fidelity| fidelity.name() == method);
+        let fidelity = Fidelity::by_name(method).is_some();
         let exact = method == "exact";
         let best = best_isa(rows_of_all);
         if fidelity && isa != best && !exact {

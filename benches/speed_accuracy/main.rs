@@ -84,7 +84,7 @@ fn main() -> ExitCode {
 
 /// Evaluates one method so many times, on the fast scene of the first machine.
 fn count(arguments: &Arguments, fidelity: &str) -> Result<(), Failure> {
-    let fidelity = Fidelity::ALL.into_iter().find(|known| known.name() == fidelity);
+    let fidelity = Fidelity::by_name(fidelity);
     let fidelity = fidelity.ok_or_else(|| {
         format!("no such fidelity; one of {}", Fidelity::ALL.map(Fidelity::name).join(", "))
     })?;

@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
+use hexad_client::operator::protocol::RequestLine;
 use hexad_core::motion::built_in::BuiltInMotion;
 use hexad_machine::config::{Config, ConfigError};
 use hexad_machine::text::csv_table::GROUPS;
@@ -62,6 +63,23 @@ impl OptionalMachineFile {
     }
 }
 
+#[derive(Clone, Copy, Debug, Args)]
+pub struct EngageOptions {
+    /// Take control, if the platform is not under control
+    #[arg(long)]
+    engage: bool,
+    /// Longest to wait for control [s]
+    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
+    within: f64,
+}
+
+impl EngageOptions {
+    /// A request of a motion with these options.
+    pub fn line(self, request: &str) -> RequestLine {
+        RequestLine { engage: self.engage, within_s: self.within, ..RequestLine::new(request) }
+    }
+}
+
 #[derive(Debug, Args)]
 pub struct TableFiles {
     /// CSV to read; `-` is standard input
@@ -81,11 +99,9 @@ pub struct TableFiles {
 
 /// Parser of the names of built-in motions.
 pub fn built_in_motion() -> impl TypedValueParser<Value = BuiltInMotion> {
-    let names = BuiltInMotion::ALL.map(BuiltInMotion::name_and_description);
-    let values = names.map(|(name, description)| PossibleValue::new(name).help(description));
-    PossibleValuesParser::new(values).map(|name| {
-        BuiltInMotion::ALL.into_iter().find(|motion| motion.name() == name).unwrap_or(BuiltInMotion::Settle)
-    })
+    let value = |motion: BuiltInMotion| PossibleValue::new(motion.name()).help(motion.description());
+    PossibleValuesParser::new(BuiltInMotion::ALL.map(value))
+        .map(|name| BuiltInMotion::by_name(&name).unwrap_or(BuiltInMotion::Settle))
 }
 
 /// Duration \[s\] of a motion, a wait or a measurement.

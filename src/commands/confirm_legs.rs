@@ -9,7 +9,7 @@ use std::os::fd::AsFd as _;
 use clap::Args;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
-use super::arguments::{MachineFile, duration};
+use super::arguments::{EngageOptions, MachineFile};
 use super::failure::Failure;
 use super::motion_client::{MotionClient, MotionError};
 use super::quantity::length_within;
@@ -51,20 +51,15 @@ pub struct ConfirmLegsArguments {
     /// Legs that move, in the order of the motions, for example 1,2,3,4,5,6: instead of the questions, for scripts
     #[arg(long, value_name = "LEGS", value_parser = answers)]
     answers: Option<[u32; LEGS]>,
-    /// Take control, if the platform is not under control
-    #[arg(long)]
-    engage: bool,
-    /// Longest to wait for control [s]
-    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
-    within: f64,
+    #[command(flatten)]
+    engage: EngageOptions,
 }
 
 impl ConfirmLegsArguments {
     pub fn execute(self) -> Result<(), Failure> {
         if self.answers.is_none() && !stdin().is_terminal() {
-            let message =
-                "confirm-legs asks a person: standard input must be a terminal, or give --answers".into();
-            return Err(Failure { exit_code: 2, message });
+            let text = "confirm-legs asks a person: standard input must be a terminal, or give --answers";
+            return Err(Failure::before_start(text));
         }
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
         let actuator = &config.machine.actuator;
@@ -79,8 +74,7 @@ impl ConfirmLegsArguments {
             ..RequestLine::new(CONFIRM_LEGS)
         };
         client.carry_out(confirm(None), |_| Ok(()))?;
-        let (engage, within_s) = (self.engage, self.within);
-        client.carry_out(RequestLine { engage, within_s, stops, ..RequestLine::new(HOLD) }, |_| Ok(()))?;
+        client.carry_out(RequestLine { stops, ..self.engage.line(HOLD) }, |_| Ok(()))?;
         let seen = Observation::of_answer(&client.status_under_control()?, 0, &config.machine.home);
         let seen = seen.unwrap_or_default();
         let from = seen.target.or(seen.reference).unwrap_or(config.machine.home);
@@ -110,7 +104,7 @@ impl ConfirmLegsArguments {
             None => Ok(print(format_args!(
                 "each leg is the one of its number ({kept}); the platform stands under control; hexad stop or park ends it\n"
             ))?),
-            Some(message) => Err(Failure { exit_code: 1, message }),
+            Some(message) => Err(Failure::after_start(message)),
         }
     }
 }
@@ -140,14 +134,13 @@ fn targets(
     let mut targets = [*from; LEGS];
     for (leg, target) in targets.iter_mut().enumerate() {
         let found = reached(leg, distance).or_else(|first| reached(leg, -distance).map_err(|_| first));
-        *target = found.map_err(|reason| Failure {
-            exit_code: 2,
-            message: format!(
+        *target = found.map_err(|reason| {
+            Failure::before_start(format_args!(
                 "leg {} cannot change by {} mm from here: {reason}\nnothing has moved; go to another pose (hexad goto --home), \
                  or give a smaller --distance",
                 leg + 1,
                 significant(1e3 * distance)
-            ),
+            ))
         })?;
     }
     Ok(targets)

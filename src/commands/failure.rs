@@ -1,6 +1,7 @@
 //! Failure of a command, and its exit code.
 
 use core::error::Error;
+use core::fmt::Display;
 
 use crate::output::svg::ChartError;
 use hexad_client::messages::PortError;
@@ -18,7 +19,8 @@ pub const INTERRUPTED: u8 = 130;
 
 /// Error that ends a command, with the exit code of the process. 1: the command ran and failed. 2: it could
 /// not begin, and cannot without a correction.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
 pub struct Failure {
     pub exit_code: u8,
     pub message: String,
@@ -26,27 +28,27 @@ pub struct Failure {
 
 impl Failure {
     /// Failure of a command that could not begin.
-    pub fn before_start(error: impl Error) -> Self {
+    pub fn before_start(error: impl Display) -> Self {
         Self { exit_code: 2, message: error.to_string() }
+    }
+
+    /// Failure of a command that has run.
+    pub fn after_start(error: impl Display) -> Self {
+        Self { exit_code: 1, message: error.to_string() }
+    }
+
+    /// End of a command that a signal has interrupted.
+    pub fn interrupted(error: impl Display) -> Self {
+        Self { exit_code: INTERRUPTED, message: error.to_string() }
     }
 }
 
 /// Error that can end a command.
 pub trait CommandError: Error {
-    /// Whether the command had begun.
-    fn has_begun(&self) -> bool {
-        false
-    }
-
-    /// Exit code of the process.
+    /// Exit code of the process: 1 if the command ran and failed, 2 if it could not begin.
     fn exit_code(&self) -> u8 {
-        default_exit_code(self)
+        2
     }
-}
-
-/// Exit code of a command that ran and failed, or could not begin.
-pub fn default_exit_code(error: &(impl CommandError + ?Sized)) -> u8 {
-    if error.has_begun() { 1 } else { 2 }
 }
 
 impl<E: CommandError> From<E> for Failure {
@@ -59,13 +61,11 @@ impl CommandError for ConfigError {}
 
 impl CommandError for DaemonError {
     /// A refusal of the system, or another daemon, may not persist. A service manager then tries again.
-    fn has_begun(&self) -> bool {
-        let is_configured =
-            |error: &SocketError| matches!(error, SocketError::NoGroup(..) | SocketError::NotMember(..));
+    fn exit_code(&self) -> u8 {
         match self {
-            Self::NotRealtime(_) | Self::Files(_) | Self::Config(_) => false,
-            Self::Socket(error) => !is_configured(error),
-            Self::Port(_) | Self::Signals(_) | Self::Thread(_) | Self::Died(_) | Self::Report(_) => true,
+            Self::NotRealtime(_) | Self::Files(_) | Self::Config(_) => 2,
+            Self::Socket(SocketError::NoGroup(..) | SocketError::NotMember(..)) => 2,
+            _ => 1,
         }
     }
 }
@@ -75,29 +75,33 @@ impl CommandError for RecordingError {}
 impl CommandError for ctrlc::Error {}
 
 impl CommandError for ChartError {
-    fn has_begun(&self) -> bool {
-        true
+    fn exit_code(&self) -> u8 {
+        1
     }
 }
 
 impl CommandError for FileError {
-    fn has_begun(&self) -> bool {
-        true
+    fn exit_code(&self) -> u8 {
+        1
     }
 }
 
 impl CommandError for OperatorError {
-    fn has_begun(&self) -> bool {
-        !matches!(self, Self::NoDaemon(_) | Self::NoMachine | Self::Several(_) | Self::Forbidden { .. })
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::NoDaemon(_) | Self::NoMachine | Self::Several(_) | Self::Forbidden { .. } => 2,
+            _ => 1,
+        }
     }
 }
 
 impl CommandError for TargetError {
-    fn has_begun(&self) -> bool {
+    fn exit_code(&self) -> u8 {
         match self {
-            Self::Port(_) | Self::Simulated => false,
-            Self::Operator(error) => error.has_begun(),
-            _ => self.result() != RequestResult::Invalid,
+            Self::Port(_) | Self::Simulated => 2,
+            Self::Operator(error) => error.exit_code(),
+            _ if self.result() == RequestResult::Invalid => 2,
+            _ => 1,
         }
     }
 }

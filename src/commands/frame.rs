@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::arguments::MachineFile;
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use super::frame_options::{FrameOptions, UnitOptions};
 use super::machine_file::{difference, with_frame, write_new};
 use hexad_client::operator::requests::status;
 use hexad_core::model::rigid::Pose;
 use hexad_core::model::task::{pose_of, task_coordinates};
 use hexad_core::motion::frames::Frames;
-use hexad_daemon::target_source::{Observation, TargetError};
+use hexad_daemon::target_source::{Observation, TargetError, reason};
 use hexad_machine::config::Config;
 use hexad_machine::config::frames::{FrameKind, NamedFrame};
 use hexad_machine::text::coordinate_rows::CoordinateFormat;
@@ -65,21 +65,6 @@ struct SetArguments {
     output: PathBuf,
 }
 
-/// Reason why no frame is set.
-#[derive(Debug, thiserror::Error)]
-enum FrameError {
-    #[error("{place}: no frame is named {name:?}; --kind tool or --kind work makes a new one")]
-    Unknown { place: String, name: String },
-    #[error(
-        "{place}: {name:?} is a {kind} frame, not a {wanted} frame; choose another name, or leave out --kind"
-    )]
-    Mismatch { place: String, name: String, kind: FrameKind, wanted: FrameKind },
-    #[error("a {kind} frame is set from a {other} frame: --{kind} must be left out")]
-    NotUsed { kind: FrameKind, other: FrameKind },
-}
-
-impl CommandError for FrameError {}
-
 impl FrameArguments {
     pub fn execute(self) -> Result<(), Failure> {
         match self.action {
@@ -98,9 +83,8 @@ impl SetArguments {
         let frames = config.frames_named(self.frames.tool.as_deref(), self.frames.work.as_deref())?;
         let answer = status(&config.name)?;
         let seen = Observation::of_answer(&answer, 0, &config.machine.home);
-        let here = seen
-            .and_then(|seen| seen.reference)
-            .ok_or(TargetError::UnknownPose(answer.text.as_str().into()))?;
+        let here =
+            seen.and_then(|seen| seen.reference).ok_or(TargetError::UnknownPose(reason(&answer.text)))?;
         let x = task_coordinates(&frame_here(&frames, kind, &pose_of(&here)), &[0.0; 6]);
         let text = with_frame(&config.text, &NamedFrame { name: self.name, kind, x })?;
         Config::parse(&text, "the new machine file")?;
@@ -110,25 +94,31 @@ impl SetArguments {
     }
 
     /// Kind of the frame of the file with this name, else of the option.
-    fn kind(&self, config: &Config) -> Result<FrameKind, FrameError> {
-        let (place, name) = (config.place.clone(), self.name.clone());
-        let found = config.frames.iter().find(|frame| frame.name == name).map(|frame| frame.kind);
+    fn kind(&self, config: &Config) -> Result<FrameKind, Failure> {
+        let (place, name) = (&config.place, &self.name);
+        let found = config.frames.iter().find(|frame| frame.name == *name).map(|frame| frame.kind);
         let kind = match (found, self.kind) {
             (Some(kind), Some(wanted)) if kind != wanted => {
-                return Err(FrameError::Mismatch { place, name, kind, wanted });
+                return Err(Failure::before_start(format_args!(
+                    "{place}: {name:?} is a {kind} frame, not a {wanted} frame; choose another name, or leave out --kind"
+                )));
             }
-            (None, None) => return Err(FrameError::Unknown { place, name }),
+            (None, None) => {
+                return Err(Failure::before_start(format_args!(
+                    "{place}: no frame is named {name:?}; --kind tool or --kind work makes a new one"
+                )));
+            }
             (Some(kind), _) | (None, Some(kind)) => kind,
         };
-        match (kind, &self.frames) {
-            (FrameKind::Tool, FrameOptions { tool: Some(_), .. }) => {
-                Err(FrameError::NotUsed { kind, other: FrameKind::Work })
-            }
-            (FrameKind::Work, FrameOptions { work: Some(_), .. }) => {
-                Err(FrameError::NotUsed { kind, other: FrameKind::Tool })
-            }
-            _ => Ok(kind),
+        let (unused, other) = match kind {
+            FrameKind::Tool => (&self.frames.tool, FrameKind::Work),
+            FrameKind::Work => (&self.frames.work, FrameKind::Tool),
+        };
+        if unused.is_some() {
+            let text = format!("a {kind} frame is set from a {other} frame: --{kind} must be left out");
+            return Err(Failure::before_start(text));
         }
+        Ok(kind)
     }
 }
 

@@ -4,13 +4,12 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::arguments::{MachineFile, duration};
+use super::arguments::{EngageOptions, MachineFile};
 use super::failure::Failure;
 use super::motion_client::{MotionClient, MotionError};
 use super::request::machine_name;
 use hexad_client::operator::Order;
 use hexad_client::operator::motion_fields::HOLD;
-use hexad_client::operator::protocol::RequestLine;
 use hexad_client::operator::stops::stop_machine;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::Request;
@@ -26,20 +25,15 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(200);
 pub struct HoldArguments {
     #[command(flatten)]
     machine: MachineFile,
-    /// Take control, if the platform is not under control
-    #[arg(long)]
-    engage: bool,
-    /// Longest to wait for control [s]
-    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
-    within: f64,
+    #[command(flatten)]
+    engage: EngageOptions,
 }
 
 impl HoldArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let (machine, stop) = (machine_name(self.machine.path())?, Stop::on_signals()?);
         let mut client = MotionClient::connect(&machine, &stop)?;
-        let Self { engage, within: within_s, .. } = self;
-        match client.carry_out(RequestLine { engage, within_s, ..RequestLine::new(HOLD) }, |_| Ok(())) {
+        match client.carry_out(self.engage.line(HOLD), |_| Ok(())) {
             Ok(_) => print("the platform stands under control; Ctrl-C ends it with a stop\n")?,
             // A stop follows, because control may have been taken just now.
             Err(MotionError::Interrupted | MotionError::InterruptedEarly) => {}

@@ -63,9 +63,8 @@ impl InverseDynamicsArguments {
 }
 
 fn fidelity_by_name() -> impl TypedValueParser<Value = Fidelity> {
-    PossibleValuesParser::new(Fidelity::ALL.map(Fidelity::name)).map(|name| {
-        Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == name).unwrap_or(Fidelity::Exact)
-    })
+    PossibleValuesParser::new(Fidelity::ALL.map(Fidelity::name))
+        .map(|name| Fidelity::by_name(&name).unwrap_or(Fidelity::Exact))
 }
 
 /// Forces of the legs, lengths and their derivatives, and commands of the drives for a table with the columns of a trajectory, and

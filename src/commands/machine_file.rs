@@ -12,8 +12,8 @@ pub use self::difference::{changed_margins, difference};
 use self::estimate::array;
 pub use self::estimate::{Estimate, NewNumbers, NewValue};
 pub use self::frame::with_frame;
-use super::failure::CommandError;
-use hexad_machine::text::files::{FileError, is_standard, write_whole};
+use super::failure::Failure;
+use hexad_machine::text::files::{is_standard, write_whole};
 
 mod change_comment;
 mod difference;
@@ -25,78 +25,48 @@ mod tests;
 /// Type of a value that a new value replaces.
 const NUMERIC: &str = "a number or an array of numbers";
 
-/// Error of writing a new machine file.
-#[derive(Debug, thiserror::Error)]
-pub enum MachineFileError {
-    /// The text, or what the new values make of it, is not TOML.
-    #[error("machine file: {message}; correct it, or enter the new values by hand")]
-    Syntax {
-        /// Error of the parser.
-        message: String,
-    },
-    /// A new value belongs where the file has a value of another type.
-    #[error(
-        "{key} is of type {found} in the machine file, must be {expected}; correct it, or enter the new value by hand"
-    )]
-    Type {
-        /// Full name of the key.
-        key: String,
-        /// Type of its value.
-        found: &'static str,
-        /// Type that a new value can replace.
-        expected: &'static str,
-    },
-    /// A new value or its deviation is infinite or NaN.
-    #[error("estimate of {key} must be finite; keep the old value")]
-    NotFinite {
-        /// Full name of the key.
-        key: String,
-    },
-    /// The output exists.
-    #[error("{place} exists already; name another file with --output, or remove it")]
-    Exists {
-        /// The file, as given.
-        place: String,
-    },
-    /// Error of the file system.
-    #[error(transparent)]
-    File(#[from] FileError),
-}
-
-impl CommandError for MachineFileError {}
-
 /// Text of a machine file with new values.
 ///
 /// A number that equals its estimate but for digits that the deviation does not justify stays. A missing key is
 /// added at the end of its section, a missing section at the end of the file.
-pub fn edited(text: &str, values: &[NewValue]) -> Result<String, MachineFileError> {
+pub fn edited(text: &str, values: &[NewValue]) -> Result<String, Failure> {
     let mut document = parsed(text)?;
     for new in values {
         let is_finite = |estimate: &Estimate| estimate.value.is_finite() && estimate.deviation.is_finite();
         if !new.value.estimates().iter().all(is_finite) {
-            return Err(MachineFileError::NotFinite { key: new.path.join(".") });
+            let key = &new.key;
+            return Err(Failure::before_start(format_args!(
+                "estimate of {key} must be finite; keep the old value"
+            )));
         }
-        set(document.as_table_mut(), new.path, new, false)?;
+        set(document.as_table_mut(), &new.key, new, false)?;
     }
     written(text, &document)
 }
 
 /// Writes a new machine file durably, completely or not at all. A file that exists stays as it is, above all the one in
 /// force. `-` is standard output.
-pub fn write_new(path: &Path, text: &str) -> Result<(), MachineFileError> {
+pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     if !is_standard(path) && path.symlink_metadata().is_ok() {
-        return Err(MachineFileError::Exists { place: path.display().to_string() });
+        let place = path.display();
+        return Err(Failure::before_start(format_args!(
+            "{place} exists already; name another file with --output, or remove it"
+        )));
     }
-    Ok(write_whole(path, text.as_bytes())?)
+    write_whole(path, text.as_bytes()).map_err(Failure::before_start)
 }
 
-fn parsed(text: &str) -> Result<DocumentMut, MachineFileError> {
-    text.parse()
-        .map_err(|error: toml_edit::TomlError| MachineFileError::Syntax { message: error.message().into() })
+fn parsed(text: &str) -> Result<DocumentMut, Failure> {
+    text.parse().map_err(|error: toml_edit::TomlError| {
+        let message = error.message();
+        Failure::before_start(format_args!(
+            "machine file: {message}; correct it, or enter the new values by hand"
+        ))
+    })
 }
 
 /// The document with the line ends of the text.
-fn written(text: &str, document: &DocumentMut) -> Result<String, MachineFileError> {
+fn written(text: &str, document: &DocumentMut) -> Result<String, Failure> {
     let mut written = document.to_string();
     parsed(&written)?;
     if !text.ends_with('\n') && written.ends_with('\n') {
@@ -105,36 +75,35 @@ fn written(text: &str, document: &DocumentMut) -> Result<String, MachineFileErro
     Ok(if text.contains("\r\n") { written.replace('\n', "\r\n") } else { written })
 }
 
+/// A new value belongs where the file has a value of another type.
+fn wrong_type(key: &str, found: &str, expected: &str) -> Failure {
+    Failure::before_start(format_args!(
+        "{key} is of type {found} in the machine file, must be {expected}; correct it, or enter the new value by hand"
+    ))
+}
+
 /// What was changed: the old text of a value, `None` for a new one.
 type Changed = Option<Option<String>>;
 
 /// Sets the value at the end of a path below a table, with the comment behind the outermost value.
-fn set(
-    table: &mut dyn TableLike,
-    path: &[&str],
-    new: &NewValue,
-    is_inline: bool,
-) -> Result<Changed, MachineFileError> {
-    let Some((name, below)) = path.split_first() else { return Ok(None) };
-    let of_type = |found: &Item, expected| {
-        let (key, found) = (new.path.join("."), found.type_name());
-        MachineFileError::Type { key, found, expected }
-    };
+fn set(table: &mut dyn TableLike, path: &str, new: &NewValue, is_inline: bool) -> Result<Changed, Failure> {
+    let (name, below) = path.split_once('.').unwrap_or((path, ""));
+    let of_type = |found: &Item, expected| wrong_type(&new.key, found.type_name(), expected);
     let is_new = !table.contains_key(name);
     if is_new {
         insert(table, name, !below.is_empty(), new, is_inline);
     }
     let Some(item) = table.get_mut(name) else { return Ok(None) };
     let changed = match below {
-        [] if is_new => Some(None),
-        [] => replace(item, new).ok_or_else(|| of_type(item, NUMERIC))?,
+        "" if is_new => Some(None),
+        "" => replace(item, new).ok_or_else(|| of_type(item, NUMERIC))?,
         _ => {
             let (is_inline, of_value) = (item.is_inline_table(), of_type(item, "a table"));
             set(item.as_table_like_mut().ok_or(of_value)?, below, new, is_inline)?
         }
     };
     if let (Some(old), Some(value), false) = (&changed, item.as_value_mut(), is_inline) {
-        comment(value.decor_mut(), &below.join("."), old.clone(), new);
+        comment(value.decor_mut(), below, old.clone(), new);
     }
     Ok(changed)
 }
@@ -202,10 +171,10 @@ fn number(value: &Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|x| x as f64))
 }
 
-/// Whether a machine file has a table at a path.
-pub fn has_table(text: &str, path: &[&str]) -> bool {
+/// Whether a machine file has a table at a key.
+pub fn has_table(text: &str, key: &str) -> bool {
     let document = parsed(text).unwrap_or_default();
-    path.iter().try_fold(document.as_item(), |item, key| item.get(key)).is_some_and(Item::is_table_like)
+    key.split('.').try_fold(document.as_item(), |item, key| item.get(key)).is_some_and(Item::is_table_like)
 }
 
 fn comment(decor: &mut Decor, key: &str, old: Option<String>, new: &NewValue) {

@@ -92,14 +92,6 @@ fn screaming(name: &str) -> String {
     text
 }
 
-/// `hexad_loop_times` as `LoopTimes`.
-fn class(layout: &Layout) -> String {
-    let words = layout.type_name.split('_').skip(1);
-    words
-        .flat_map(|word| word.chars().take(1).flat_map(char::to_uppercase).chain(word.chars().skip(1)))
-        .collect()
-}
-
 /// Meaning and unit, on one line.
 fn comment(field: &Field) -> String {
     let mut text = field.doc.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -173,7 +165,7 @@ fn python_module(f: &mut fmt::Formatter<'_>) -> fmt::Result {
     write!(f, "{PYTHON_BASE}")?;
     for layout in structs() {
         let base = if layout.topic.is_some() { "Message" } else { "ctypes.Structure" };
-        writeln!(f, "\n\nclass {}({base}):\n    \"\"\"{}\"\"\"\n", class(layout), summary(layout))?;
+        writeln!(f, "\n\nclass {}({base}):\n    \"\"\"{}\"\"\"\n", layout.class(), summary(layout))?;
         if let Some(Topic { name, schema }) = layout.topic {
             writeln!(f, "    topic = \"{name}\"\n    schema = {schema}")?;
         }
@@ -183,7 +175,7 @@ fn python_module(f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 Kind::U32 => "c_uint32".into(),
                 Kind::U64 => "c_uint64".into(),
                 Kind::F64 => "c_double".into(),
-                Kind::Struct(nested) => class(nested),
+                Kind::Struct(nested) => nested.class(),
             };
             let count = field.count.map_or(String::new(), |count| format!(" * {count}"));
             let comment = Some(comment(field)).filter(|it| !it.is_empty());

@@ -6,37 +6,8 @@
 
 use clap::{Parser, Subcommand};
 
-use self::advise::AdviseArguments;
 use self::arguments::MachineFile;
-use self::check::CheckArguments;
-use self::confirm_legs::ConfirmLegsArguments;
-use self::convert::ConvertArguments;
-use self::demo::DemoArguments;
-use self::doctor::DoctorArguments;
-use self::excite::ExciteArguments;
-use self::export::ExportArguments;
 use self::failure::Failure;
-use self::faults::FaultsArguments;
-use self::forward_kinematics::ForwardKinematicsArguments;
-use self::frame::FrameArguments;
-use self::goto::GotoArguments;
-use self::hold::HoldArguments;
-use self::identify::IdentifyArguments;
-use self::inverse_dynamics::InverseDynamicsArguments;
-use self::jog::JogArguments;
-use self::manuals::ManualsArguments;
-use self::messages::MessagesArguments;
-use self::r#move::MoveArguments;
-use self::record::RecordArguments;
-use self::recover::RecoverArguments;
-use self::replay::ReplayArguments;
-use self::report::ReportArguments;
-use self::request::{EngageArguments, RequestArguments, StopArguments};
-use self::ride::RideArguments;
-use self::run::RunArguments;
-use self::status::StatusArguments;
-use self::view::ViewArguments;
-use self::workspace::WorkspaceArguments;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::Request;
 use hexad_daemon::version::VERSION;
@@ -96,78 +67,78 @@ pub struct CommandLine {
 #[derive(Debug, Subcommand)]
 enum CommandArguments {
     /// Run the controller daemon until SIGINT or SIGTERM
-    Run(RunArguments),
+    Run(run::RunArguments),
     /// Simulate the hardware as a process of its own
     Plant(MachineFile),
     /// Play a motion or a trajectory as a setpoint source
-    Move(MoveArguments),
+    Move(r#move::MoveArguments),
     /// Play a motion from which masses, friction and the delay of the drives can be identified
-    Excite(ExciteArguments),
+    Excite(excite::ExciteArguments),
     /// Move the platform to a pose and hold it there under control
-    Goto(GotoArguments),
+    Goto(goto::GotoArguments),
     /// Keep the platform under control where it is, until Ctrl-C; then stop
-    Hold(HoldArguments),
+    Hold(hold::HoldArguments),
     /// Begin or end a ride that a stream of poses moves (move --udp)
-    Ride(RideArguments),
+    Ride(ride::RideArguments),
     /// Move the platform by keys on a terminal, while they are held
-    Jog(JogArguments),
+    Jog(jog::JogArguments),
     /// Move one leg after the other, and keep which leg a person sees moving: exchanged cables look correct to the daemon
-    ConfirmLegs(ConfirmLegsArguments),
+    ConfirmLegs(confirm_legs::ConfirmLegsArguments),
     /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
-    Demo(DemoArguments),
+    Demo(demo::DemoArguments),
     /// Take control: the platform follows the setpoint from now on
-    Engage(EngageArguments),
+    Engage(request::EngageArguments),
     /// Come to rest under control, then disable the forces; the brakes close
-    Stop(StopArguments),
+    Stop(request::StopArguments),
     /// Come to rest, go to the home pose, then disable the forces; the brakes close
-    Park(RequestArguments),
+    Park(request::RequestArguments),
     /// Leave a fault; the platform stays without force until engaged
-    Clear(RequestArguments),
+    Clear(request::RequestArguments),
     /// Disable the forces at once; the brakes close
-    Off(StopArguments),
+    Off(request::StopArguments),
     /// Disable the forces at once, until cleared; the brakes close
-    Estop(StopArguments),
+    Estop(request::StopArguments),
     /// Take over gains, limits and timeouts of the daemon's machine file, while no force is valid
-    Reload(RequestArguments),
+    Reload(request::RequestArguments),
     /// Show state, diagnostic, pose, legs, timing and sources of a running daemon
-    Status(StatusArguments),
+    Status(status::StatusArguments),
     /// Show the charts of a recording's page live, for a browser on this host
-    View(ViewArguments),
+    View(view::ViewArguments),
     /// Show what the numbers of states, faults and limits mean, and what to do
-    Faults(FaultsArguments),
+    Faults(faults::FaultsArguments),
     /// Print the declarations of the messages for a driver in another language
-    Messages(MessagesArguments),
+    Messages(messages::MessagesArguments),
     /// Show the named frames of a machine file, or set one where the platform is
-    Frame(FrameArguments),
+    Frame(frame::FrameArguments),
     /// Validate a machine file and show the machine at home
-    Check(CheckArguments),
+    Check(check::CheckArguments),
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
-    Doctor(DoctorArguments),
+    Doctor(doctor::DoctorArguments),
     /// Identify masses, friction and force scales of the machine from recordings of its motions
-    Identify(IdentifyArguments),
+    Identify(identify::IdentifyArguments),
     /// Show the error and the time of each model fidelity over an envelope or a trajectory, and recommend one
-    Advise(AdviseArguments),
+    Advise(advise::AdviseArguments),
     /// Map what the machine reaches and what it can do there; find the largest regions without obstacle
-    Workspace(WorkspaceArguments),
+    Workspace(workspace::WorkspaceArguments),
     /// Write the machine as a model for other tools
-    Export(ExportArguments),
+    Export(export::ExportArguments),
     /// Compute the cycles of a recording again and compare every output; or copy a part of it
-    Replay(ReplayArguments),
+    Replay(replay::ReplayArguments),
     /// Write a recording as one page with charts, which any browser opens from disk
-    Report(ReportArguments),
+    Report(report::ReportArguments),
     /// Write a recording in another format
-    Convert(ConvertArguments),
+    Convert(convert::ConvertArguments),
     /// Write the last seconds of a running daemon, which it keeps in memory, as a recording
-    Record(RecordArguments),
+    Record(record::RecordArguments),
     /// Complete a recording that a crash or a full disk has left unfinished
-    Recover(RecoverArguments),
+    Recover(recover::RecoverArguments),
     /// Forces, lengths and their derivatives for a file of motions
-    InverseDynamics(InverseDynamicsArguments),
+    InverseDynamics(inverse_dynamics::InverseDynamicsArguments),
     /// Poses, and twists if there are rates, for a file of leg lengths
-    ForwardKinematics(ForwardKinematicsArguments),
+    ForwardKinematics(forward_kinematics::ForwardKinematicsArguments),
     /// Write manual pages and completions of shells into a folder
     #[command(hide = true)]
-    Manuals(ManualsArguments),
+    Manuals(manuals::ManualsArguments),
 }
 
 impl CommandLine {
@@ -181,7 +152,7 @@ impl CommandLine {
         use CommandArguments as Is;
         match self.command {
             Is::Run(arguments) => arguments.execute(),
-            Is::Plant(machine) => Ok(plant::run(&machine.load()?, &Stop::on_signals()?)?),
+            Is::Plant(machine) => plant::run(&machine.load()?, &Stop::on_signals()?),
             Is::Move(arguments) => arguments.execute(),
             Is::Excite(arguments) => arguments.execute(),
             Is::Goto(arguments) => arguments.execute(),

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use super::failure::{CommandError, INTERRUPTED, default_exit_code};
+use super::failure::{CommandError, INTERRUPTED};
 use hexad_client::operator::OperatorError;
 use hexad_client::operator::connection::Connection;
 use hexad_client::operator::motion_fields::HOLD;
@@ -39,18 +39,12 @@ pub enum MotionError {
 }
 
 impl CommandError for MotionError {
-    fn has_begun(&self) -> bool {
-        match self {
-            Self::Operator(error) => error.has_begun(),
-            Self::Invalid(_) => false,
-            _ => true,
-        }
-    }
-
     fn exit_code(&self) -> u8 {
         match self {
+            Self::Operator(error) => error.exit_code(),
+            Self::Invalid(_) => 2,
             Self::Interrupted | Self::InterruptedEarly => INTERRUPTED,
-            _ => default_exit_code(self),
+            _ => 1,
         }
     }
 }
@@ -120,7 +114,7 @@ impl<'a> MotionClient<'a> {
     /// The status of the daemon. An error if the platform is not under control.
     pub fn status_under_control(&mut self) -> Result<AnswerLine, MotionError> {
         let answer = self.ask(&RequestLine::new("status"))?;
-        let follows = State::ALL.into_iter().any(|it| it.follows() && it.name() == answer.state);
+        let follows = State::by_name(&answer.state).is_some_and(State::follows);
         let AnswerLine { state, text, .. } = &answer;
         let ended = || MotionError::Failed(format!("control has ended: the daemon is in {state}: {text}"));
         if follows { Ok(answer) } else { Err(ended()) }

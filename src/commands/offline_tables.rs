@@ -24,8 +24,8 @@ pub struct UnsolvedRows {
 }
 
 impl CommandError for UnsolvedRows {
-    fn has_begun(&self) -> bool {
-        true
+    fn exit_code(&self) -> u8 {
+        1
     }
 }
 

@@ -33,10 +33,7 @@ impl OrientationFormat {
     /// Reader of the name of a format: of an order of rotations, or `quaternion`.
     pub fn by_name() -> impl TypedValueParser<Value = Self> {
         PossibleValuesParser::new(RotationOrder::ALL.map(RotationOrder::name).into_iter().chain([QUATERNION]))
-            .map(|name| {
-                let order = RotationOrder::ALL.into_iter().find(|order| order.name() == name);
-                order.map_or(Self::Quaternion, Self::Angles)
-            })
+            .map(|name| RotationOrder::by_name(&name).map_or(Self::Quaternion, Self::Angles))
     }
 
     /// Names of the columns of poses.

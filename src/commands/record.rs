@@ -47,7 +47,7 @@ impl RecordArguments {
 fn record(machine: &str, last_s: f64, file: &File) -> Result<String, OperatorError> {
     let line = RequestLine { last_s: Some(last_s), ..RequestLine::new("record") };
     let answer = ask_first(machine, |connection: &mut Connection| {
-        let text = serde_json::to_string(&line)? + "\n";
+        let text = line.to_line()?;
         let count = file_passing::send(connection.stream(), text.as_bytes(), file)?;
         connection.stream().write_all(text.as_bytes().get(count..).unwrap_or_default())?;
         connection.receive(Instant::now() + RECORD_LIMIT, || false)

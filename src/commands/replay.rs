@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use fearless_simd::Level;
 
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use hexad_core::model::machine::at_most_256_bits;
 use hexad_daemon::recorder::instruction_set;
 use hexad_daemon::recording::copy::copy;
@@ -50,28 +50,6 @@ fn part(text: &str) -> Result<Part, String> {
     }
 }
 
-/// Error if the replay differs from the recording.
-#[derive(Debug, thiserror::Error)]
-enum ReplayError {
-    #[error(
-        "{0} of the cycles differ: the outputs of hexad {VERSION} are not those of the recording, which is of hexad {1}"
-    )]
-    Different(u64, String),
-    #[error(
-        "no cycle could be compared: the memory of the controller in the recording is that of hexad {0}, and this is \
-         hexad {VERSION}; use that version"
-    )]
-    Unknown(String),
-    #[error("no cycle is in {0:?} s; the recording is {1:.3} s long")]
-    NoPart(RangeInclusive<f64>, f64),
-}
-
-impl CommandError for ReplayError {
-    fn has_begun(&self) -> bool {
-        true
-    }
-}
-
 impl ReplayArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
@@ -91,12 +69,20 @@ impl ReplayArguments {
         recording.remark(&summary);
         print(description(&recording, &summary, &replay, other.as_ref().unwrap_or(&recorded)))?;
         if replay.compared == 0 {
-            return Err(ReplayError::Unknown(recorded_version(&info)).into());
+            return Err(Failure::after_start(format_args!(
+                "no cycle could be compared: the memory of the controller in the recording is that of hexad {}, and this is \
+                 hexad {VERSION}; use that version",
+                recorded_version(&info)
+            )));
         }
         let is_tolerated = info.instruction_set != instruction_set(recorded.machine.level)
             && replay.is_rounding(recorded.deployment.realtime.period_s());
         if replay.different > 0 && other.is_none() && !is_tolerated {
-            return Err(ReplayError::Different(replay.different, recorded_version(&info)).into());
+            return Err(Failure::after_start(format_args!(
+                "{} of the cycles differ: the outputs of hexad {VERSION} are not those of the recording, which is of hexad {}",
+                replay.different,
+                recorded_version(&info)
+            )));
         }
         Ok(())
     }
@@ -134,7 +120,9 @@ fn times_of(recording: &Recording, part: &RangeInclusive<f64>) -> Result<RangeIn
     let at = |due_ns: u64| due_ns.wrapping_add(info.clock_offset_ns);
     match (begin, end) {
         (Some(begin), Some(end)) => Ok(at(begin)..=at(end)),
-        _ => Err(ReplayError::NoPart(part.clone(), length_s).into()),
+        _ => Err(Failure::after_start(format_args!(
+            "no cycle is in {part:?} s; the recording is {length_s:.3} s long"
+        ))),
     }
 }
 

@@ -59,10 +59,12 @@ impl RideArguments {
                 RideOrder::Start => "riding\n",
                 RideOrder::End => "boarding\n",
             })?),
-            result => Err(Failure {
-                exit_code: 1,
-                message: format!("{} {}: {}", order.name(), result.words(), answer.text),
-            }),
+            result => Err(Failure::after_start(format_args!(
+                "{} {}: {}",
+                order.name(),
+                result.words(),
+                answer.text
+            ))),
         }
     }
 }

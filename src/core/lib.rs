@@ -16,4 +16,5 @@
 pub mod control;
 pub mod model;
 pub mod motion;
+mod named;
 pub mod plant;

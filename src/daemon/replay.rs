@@ -114,14 +114,16 @@ pub fn recorded_config(info: &RunInfo, level: Level) -> Result<Config, ConfigErr
 
 /// Controller with the recorded configuration.
 pub fn recorded_controller(info: &RunInfo, config: &Config) -> Controller {
-    let recorded = Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == info.fidelity);
-    let fidelity = recorded.unwrap_or_else(|| fidelity::fidelity(config));
-    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
+    controller(config, Fidelity::by_name(&info.fidelity))
 }
 
 /// Controller with another configuration.
 pub fn other_controller(config: &Config) -> Controller {
-    let fidelity = fidelity::fidelity(config);
+    controller(config, None)
+}
+
+fn controller(config: &Config, recorded: Option<Fidelity>) -> Controller {
+    let fidelity = recorded.unwrap_or_else(|| fidelity::fidelity(config));
     Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }
 

@@ -14,13 +14,12 @@ use hexad_client::realtime::cyclic::LoopReport;
 use hexad_client::realtime::setup::deadline;
 use hexad_client::realtime::usage::ThreadUsage;
 use hexad_machine::config::Config;
-use hexad_machine::text::files::{FileError, write_whole};
+use hexad_machine::text::files::{FileError, write_json};
 
 /// Report of a run: timing, tracking, resources and faults.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
     /// Version, commit and build profile of the daemon.
-    #[serde(default)]
     pub version: String,
     /// Number of cycles run since start.
     pub cycles: u64,
@@ -47,7 +46,6 @@ pub struct Report {
     /// Resources of the log thread. It allocates only to log a change of state.
     pub log_thread: ThreadUsage,
     /// Numbers of the recorder, which keeps the last seconds even without a folder.
-    #[serde(default)]
     pub recording: RecorderReport,
     /// The first faults of the run, in the order of their cycles.
     pub faults: Vec<Fault>,
@@ -143,8 +141,7 @@ impl Report {
 
     /// Writes JSON.
     pub fn write(&self, path: &Path) -> Result<(), FileError> {
-        let json = serde_json::to_vec_pretty(self).map_err(|e| FileError::on(path)(e.into()))?;
-        write_whole(path, &json)
+        write_json(path, self)
     }
 
     /// Reads JSON.

@@ -16,11 +16,10 @@ pub const STOPS: [Request; 3] = [Request::Stop, Request::Off, Request::Estop];
 
 /// Requests of the names in a list; an error names the first that is none.
 pub fn requests_of_names(names: &[String]) -> Result<Vec<Request>, String> {
-    let of_name = |name: &String| Request::ALL.into_iter().find(|request| request.name() == name);
     let unknown = |name: &String| {
         format!("requests: \"{name}\" must be one of {}", Request::ALL.map(Request::name).join(", "))
     };
-    names.iter().map(|name| of_name(name).ok_or_else(|| unknown(name))).collect()
+    names.iter().map(|name| Request::by_name(name).ok_or_else(|| unknown(name))).collect()
 }
 
 /// Carries out a request of a remote side, which the log of the daemon names. Returns the name of the resulting state.

@@ -102,7 +102,7 @@ pub unsafe extern "C" fn hexad_inverse_dynamics_batch(
 }
 
 fn fidelity_by_name(name: &str) -> Result<Fidelity, Failure> {
-    Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == name).ok_or_else(|| {
+    Fidelity::by_name(name).ok_or_else(|| {
         let names = Fidelity::ALL.map(Fidelity::name).join(", ");
         Failure::new(HEXAD_INVALID, format!("fidelity = {name:?} must be one of {names}"))
     })

@@ -3,6 +3,7 @@
 //! The lock is in the owner's private folder: no other user can hold it, and every process of the user finds it. The
 //! record is beside the control socket. Everybody who may use the socket may read it; it is valid while its process lives.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt, fchown};
@@ -10,12 +11,12 @@ use std::path::{Path, PathBuf};
 
 use super::bus::{PortError, port_error};
 use super::location::{
-    PRIVATE_FILE, SYSTEM_FOLDER, daemon_folders, open_private, open_user_folder, renew_prefix, system_user,
-    user_folders, user_id,
+    PRIVATE_FILE, SYSTEM_FOLDER, daemon_folders, entries, open_private, open_user_folder, renew_prefix,
+    system_user, user_folders, user_id,
 };
 
 /// End of the name of a record.
-const RECORD_EXTENSION: &str = "daemon";
+pub const RECORD_EXTENSION: &str = "daemon";
 
 /// Longest record that is read \[bytes\].
 const MAX_RECORD_BYTES: u64 = 512;
@@ -173,23 +174,24 @@ fn write_record(path: &Path, text: &str) -> io::Result<()> {
 fn all_running_daemons() -> Vec<RunningDaemon> {
     let mut found = vec![];
     for folder in daemon_folders() {
-        let records =
-            entries(&folder).filter(|path| path.extension().is_some_and(|it| it == RECORD_EXTENSION));
-        let machines =
-            records.filter_map(|path| path.file_stem().map(|it| it.to_string_lossy().into_owned()));
-        found.extend(machines.filter_map(|machine| running_daemon(&folder, &machine)));
+        let machines = machines_in(&folder, &[RECORD_EXTENSION]);
+        found.extend(machines.iter().filter_map(|machine| running_daemon(&folder, machine)));
     }
     found.sort_by(|a, b| a.machine.cmp(&b.machine).then(a.process_id.cmp(&b.process_id)));
     found
 }
 
+/// Names of the files of a folder with one of these extensions, without it, each once.
+pub fn machines_in(folder: &Path, extensions: &[&str]) -> BTreeSet<String> {
+    let is_one =
+        |path: &PathBuf| path.extension().is_some_and(|found| extensions.iter().any(|it| found == *it));
+    let files = entries(folder).filter(is_one);
+    files.filter_map(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned())).collect()
+}
+
 /// Daemons that run for a machine, of every user whose record can be read.
 pub fn running_daemons(machine: &str) -> Vec<RunningDaemon> {
     daemon_folders().iter().filter_map(|folder| running_daemon(folder, machine)).collect()
-}
-
-fn entries(folder: impl AsRef<Path>) -> impl Iterator<Item = PathBuf> {
-    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
 /// The daemon of a record. Its process must live, and folder, file and process must belong to one user, or

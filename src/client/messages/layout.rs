@@ -112,6 +112,14 @@ pub trait Declared: FieldType + Copy {
 }
 
 impl Layout {
+    /// `LoopTimes` for `hexad_loop_times`.
+    pub fn class(&self) -> String {
+        let words = self.type_name.split('_').skip(1);
+        words
+            .flat_map(|word| word.chars().take(1).flat_map(char::to_uppercase).chain(word.chars().skip(1)))
+            .collect()
+    }
+
     /// Names of all numbers, nested names joined by `_`, elements of arrays counted from 1.
     pub fn columns(&self, prefix: &str) -> Vec<String> {
         let mut columns = Vec::new();

@@ -97,11 +97,20 @@ fn own_folders(user_id: u32) -> Vec<PathBuf> {
 }
 
 fn temporary_folders(beginning: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(TEMPORARY).into_iter().flatten().flatten();
-    let named = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(beginning));
-    let mut found: Vec<_> = named.map(|entry| entry.path()).collect();
+    let mut found: Vec<_> = entries_with(TEMPORARY, beginning).collect();
     found.sort();
     found
+}
+
+/// Entries of a folder; none if it cannot be read.
+pub fn entries(folder: impl AsRef<Path>) -> impl Iterator<Item = PathBuf> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+fn entries_with(folder: &str, beginning: &str) -> impl Iterator<Item = PathBuf> {
+    entries(folder).filter(move |path| {
+        path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(beginning))
+    })
 }
 
 /// Makes the folder of this user if it is missing, whatever folders other users have made.
@@ -188,8 +197,7 @@ pub const SEGMENTS_DELETED: &str = "the files of the shared memory in /dev/shm w
 /// exist.
 pub fn are_segments_deleted() -> bool {
     let prefix = fs::read_to_string(user_folder().join(PREFIX_FILE)).unwrap_or_default();
-    let mut entries = fs::read_dir(SEGMENTS).into_iter().flatten().flatten();
-    !prefix.is_empty() && !entries.any(|entry| entry.file_name().to_string_lossy().starts_with(&prefix))
+    !prefix.is_empty() && entries_with(SEGMENTS, &prefix).next().is_none()
 }
 
 /// Opens the file of the prefix with a shared lock, and reads it. The first participant chooses the prefix.
@@ -275,10 +283,9 @@ fn has_participants(config: &Config) -> bool {
 
 /// Removes the segments of this user with a prefix.
 fn remove_segments(prefix: &str) {
-    let entries = fs::read_dir(SEGMENTS).into_iter().flatten().flatten();
-    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix)) {
+    for segment in entries_with(SEGMENTS, prefix) {
         // A segment of another user can stay, because nobody uses the prefix any more.
-        let _ = fs::remove_file(entry.path());
+        let _ = fs::remove_file(segment);
     }
 }
 

@@ -6,7 +6,7 @@
 //! `/dev/shm`, so the daemon removes that as well.
 
 use std::collections::BTreeSet;
-use std::fs::{self, read_dir};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use iceoryx2::config::Config;
@@ -14,7 +14,7 @@ use iceoryx2::node::{Node, NodeState, NodeView as _};
 use iceoryx2::prelude::*;
 
 use super::bus::PortError;
-use super::location::{Location, SEGMENTS};
+use super::location::{Location, SEGMENTS, entries};
 
 /// Folder of the nodes in iceoryx2's book-keeping: files and a folder of each, named after its number.
 const NODES: &str = "nodes";
@@ -64,16 +64,14 @@ impl Remains {
         listed.ok()?;
         let folder = PathBuf::from(self.config.global.root_path().to_string()).join(NODES);
         for node in &nodes {
-            let tags = entries(&folder.join(node.to_string()));
-            ports.extend(
-                tags.iter().filter(|tag| has_extension(tag, &[PORT_TAG])).flat_map(|tag| self.numbers(tag)),
-            );
+            let tags = entries(folder.join(node.to_string())).filter(|tag| has_extension(tag, &[PORT_TAG]));
+            ports.extend(tags.flat_map(|tag| self.numbers(&tag)));
         }
-        let of_nodes = entries(&folder).into_iter().filter(|it| {
+        let of_nodes = entries(&folder).filter(|it| {
             let numbers = self.numbers(it);
             !numbers.is_empty() && numbers.is_disjoint(&nodes)
         });
-        let of_ports = entries(Path::new(SEGMENTS)).into_iter().filter(|it| {
+        let of_ports = entries(SEGMENTS).filter(|it| {
             let numbers = self.numbers(it);
             has_extension(it, &OF_PORTS) && !numbers.is_empty() && !numbers.is_subset(&ports)
         });
@@ -90,10 +88,6 @@ impl Remains {
             own.split(['_', '.']).filter_map(|part| part.parse().ok()).collect()
         })
     }
-}
-
-fn entries(folder: &Path) -> Vec<PathBuf> {
-    read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect()
 }
 
 fn has_extension(path: &Path, extensions: &[&str]) -> bool {

@@ -229,24 +229,9 @@ impl<T: Message> LeasedSubscriber<T> {
         self.lease.publishers(monotonic_ns(), |id| self.subscriber.is_listed(id))
     }
 
-    /// See [`Subscriber::publisher_count`].
-    pub fn publisher_count(&self) -> usize {
-        self.subscriber.publisher_count()
-    }
-
-    /// See [`Subscriber::received_count`].
-    pub fn received_count(&self) -> u64 {
-        self.subscriber.received_count()
-    }
-
-    /// See [`Subscriber::last_rejection`].
-    pub fn last_rejection(&self) -> Option<Rejection> {
-        self.subscriber.last_rejection()
-    }
-
-    /// See [`Subscriber::rejections`].
-    pub fn rejections(&self) -> RejectionCounts {
-        self.subscriber.rejections()
+    /// The subscriber, for its counts.
+    pub fn subscriber(&self) -> &Subscriber<T> {
+        &self.subscriber
     }
 
     fn decide(&mut self, has_control: bool) -> Option<usize> {

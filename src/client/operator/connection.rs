@@ -83,8 +83,7 @@ impl Connection {
 
     /// Sends a request.
     pub fn send(&mut self, line: &RequestLine) -> io::Result<()> {
-        let text = serde_json::to_string(line)? + "\n";
-        self.stream.write_all(text.as_bytes())
+        self.stream.write_all(line.to_line()?.as_bytes())
     }
 
     /// The next line of the daemon; `None` if none arrived until an instant or until `stop`.

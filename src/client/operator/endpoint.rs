@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use super::connection::{Attempt, Connection, connect};
 use super::users::{group_name, is_trusted, user_name};
-use crate::messages::claim::{RunningDaemon, running_daemon};
+use crate::messages::claim::{RECORD_EXTENSION, RunningDaemon, machines_in, running_daemon};
 use crate::messages::location::{OTHERS_WRITE, SYSTEM_FOLDER, daemon_folders, user_id};
 
 /// Extensions of the socket for requests and of the read-only socket.
@@ -132,18 +132,7 @@ fn endpoints_in(folder: &Path, machine: Option<&str>) -> Vec<Endpoint> {
     let opened =
         options.read(true).custom_flags(libc::O_PATH | libc::O_DIRECTORY | libc::O_NOFOLLOW).open(folder);
     let Ok(opened) = opened.map(Arc::new) else { return vec![] };
-    let machines = machine.map_or_else(|| machines_in(folder), |machine| vec![machine.to_owned()]);
+    let all = || machines_in(folder, &[SOCKET_EXTENSION, RECORD_EXTENSION]);
+    let machines = machine.map_or_else(all, |machine| [machine.to_owned()].into());
     machines.iter().filter_map(|machine| Endpoint::find(folder, &opened, machine)).collect()
-}
-
-/// Machines that have a socket or a record in a folder.
-fn machines_in(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let files =
-        entries.filter(|path| path.extension().is_some_and(|it| it == SOCKET_EXTENSION || it == "daemon"));
-    let mut machines: Vec<_> =
-        files.filter_map(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned())).collect();
-    machines.sort();
-    machines.dedup();
-    machines
 }

@@ -14,22 +14,16 @@ pub const JOG: &str = "jog";
 #[serde(deny_unknown_fields, default)]
 pub struct TargetFields {
     /// Angle about x \[rad\].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub alpha_rad: Option<f64>,
     /// Angle about y \[rad\].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub beta_rad: Option<f64>,
     /// Angle about z \[rad\].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_rad: Option<f64>,
     /// Position along x \[m\].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub x_m: Option<f64>,
     /// Position along y \[m\].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub y_m: Option<f64>,
     /// Position along z \[m\].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub z_m: Option<f64>,
 }
 

@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 
 use super::motion_fields::{FrameField, GOTO, HOLD, JOG, RateFields, TargetFields};
 use super::ride::RidePhase;
-use super::status_report::{StatusReport, StopNumber, is_false};
+use super::status_report::{StatusReport, StopNumber};
 use hexad_core::control::signals::state::Request;
 
 /// Whether a request ends control or force. Such a request is never withdrawn.
@@ -57,11 +57,9 @@ pub struct RequestLine {
     /// `ride_start` or `ride_end`.
     pub request: String,
     /// Number by which the client knows the answer: each line about this request repeats it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u64>,
     /// The number of stops when the person asked; `None` for when the line arrives. If a stop came after it, the request is
     /// superseded. A stop needs none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stops: Option<StopNumber>,
     /// Whether the answer comes only when the request has ended: its state is reached, or cannot be.
     #[serde(default)]
@@ -73,7 +71,6 @@ pub struct RequestLine {
     #[serde(default)]
     pub progress: bool,
     /// Number of the pose that `engage` selects from the list of a refusal.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<u32>,
     /// Longest time to wait \[s\].
     #[serde(default = "default_within_s")]
@@ -81,59 +78,45 @@ pub struct RequestLine {
     /// Instant of the cycle before which a request to the controller is not obeyed, in simulated time \[ns\]; `None` for the next
     /// cycle. A line with result `waiting` then says that it is posted: the setpoint of that cycle may be published. A stop does not
     /// wait for its cycle.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cycle_ns: Option<u64>,
     /// Length of a recording \[s\]; `None` for all cycles that are kept.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,
     /// Remote side for which a bridge sends the request: its own words, which nobody has verified.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remote: Option<String>,
     /// With `status`: what the client, if it publishes setpoints, says of its own input. Reports repeat it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
     /// The same of its ride.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ride: Option<RidePhase>,
     /// With `ride_start`: whether a stream that looks wrong is followed all the same.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default)]
     pub yes: bool,
     /// Whether a motion takes control, if the platform is not under control. `within_s` bounds the wait for it.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default)]
     pub engage: bool,
     /// Tool that the coordinates describe; `None` for the platform.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool: Option<FrameField>,
     /// Frame of the coordinates; `None` for the base frame.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub work: Option<FrameField>,
     /// Order of the rotations by the angles; `None` for `xyz`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<String>,
     /// Coordinates of `goto`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetFields>,
     /// Whether the coordinates are added to the target that is held, or to the pose of the platform if none is.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default)]
     pub relative: bool,
     /// Whether the missing coordinates are taken from the home pose.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default)]
     pub home: bool,
     /// Share of the limits of autonomous motions; `None` for 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed: Option<f64>,
     /// Distance from the target at which the platform is in position \[m\], the angle in proportion; `None` for
     /// `in_position.tolerance_m`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance_m: Option<f64>,
     /// With `confirm_legs`: SHA-1 of the name and the joints of the machine file; must be that of the daemon.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry_sha1: Option<String>,
     /// With `confirm_legs`: the leg that was seen to move, for each number, from 1. `None` only compares the geometry.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legs: Option<[u32; 6]>,
     /// Rates of `jog`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate: Option<RateFields>,
 }
 
@@ -145,6 +128,13 @@ impl RequestLine {
     /// A request with an immediate answer.
     pub fn new(request: &str) -> Self {
         Self { version: VERSION, request: request.into(), within_s: DEFAULT_WITHIN_S, ..Self::default() }
+    }
+
+    /// The line with its end, without what is not given.
+    pub fn to_line(&self) -> serde_json::Result<String> {
+        let mut line = serde_json::to_value(self)?;
+        keep_given(&mut line);
+        Ok(line.to_string() + "\n")
     }
 
     /// Reads a line. A stop is obeyed in any version of the line, whatever else is in it. The error comes with the number for its answer.
@@ -164,7 +154,7 @@ impl RequestLine {
 
     /// The request to the controller; `None` if it is not for the controller, or unknown.
     pub fn controller_request(&self) -> Option<Request> {
-        Request::ALL.into_iter().find(|request| request.name() == self.request)
+        Request::by_name(&self.request)
     }
 
     /// Whether it ends control or force.
@@ -173,15 +163,23 @@ impl RequestLine {
     }
 }
 
+fn is_given(value: &Value) -> bool {
+    !matches!(value, Value::Null | Value::Bool(false))
+}
+
+fn keep_given(value: &mut Value) {
+    if let Value::Object(fields) = value {
+        fields.retain(|_, value| is_given(value));
+        fields.values_mut().for_each(keep_given);
+    }
+}
+
 /// A field that the request of a line does not use, although its sender expects an effect.
 fn foreign_field(line: &str, request: &str) -> Option<&'static str> {
     let given: Map<String, Value> = serde_json::from_str(line).unwrap_or_default();
-    let is_given = |field: &str| {
-        given.get(field).is_some_and(|value| !matches!(value, Value::Null | Value::Bool(false)))
-    };
     OWN_FIELDS
         .iter()
-        .find(|(field, owners)| !owners.contains(&request) && is_given(field))
+        .find(|(field, owners)| !owners.contains(&request) && given.get(*field).is_some_and(is_given))
         .map(|(field, _)| *field)
 }
 

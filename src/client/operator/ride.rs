@@ -5,46 +5,36 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a source with a ride does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RidePhase {
-    /// The platform moves to the boarding pose.
-    Boarding,
-    /// It stands there.
-    Ready,
-    /// It stands there, and the stream may be of other units than its format.
-    Doubtful,
-    /// It follows the stream.
-    Riding,
-    /// It stands, as the stream paused.
-    Paused,
-    /// It stands, as the operator paused it.
-    PausedByOperator,
-}
-
-impl RidePhase {
-    /// Name of the phase, as in JSON.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Boarding => "boarding",
-            Self::Ready => "ready",
-            Self::Doubtful => "doubtful",
-            Self::Riding => "riding",
-            Self::Paused => "paused",
-            Self::PausedByOperator => "paused_by_operator",
-        }
+hexad_core::named! {
+    /// What a source with a ride does.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum RidePhase {
+        /// The platform moves to the boarding pose.
+        Boarding => "boarding",
+        /// It stands there.
+        Ready => "ready",
+        /// It stands there, and the stream may be of other units than its format.
+        Doubtful => "doubtful",
+        /// It follows the stream.
+        Riding => "riding",
+        /// It stands, as the stream paused.
+        Paused => "paused",
+        /// It stands, as the operator paused it.
+        PausedByOperator => "paused_by_operator",
     }
 }
 
-/// What the operator wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RideOrder {
-    /// The platform follows the stream.
-    Start,
-    /// The platform moves to the boarding pose.
-    End,
+hexad_core::named! {
+    /// What the operator wants.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum RideOrder {
+        /// The platform follows the stream.
+        Start => "ride_start",
+        /// The platform moves to the boarding pose.
+        End => "ride_end",
+    }
 }
 
 /// What a phase means for an order.
@@ -59,17 +49,6 @@ pub enum RideVerdict {
 }
 
 impl RideOrder {
-    /// All orders.
-    pub const ALL: [Self; 2] = [Self::Start, Self::End];
-
-    /// Name of the request.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Start => "ride_start",
-            Self::End => "ride_end",
-        }
-    }
-
     /// What a phase means for this order. `is_confirmed`: the operator takes a doubtful stream as it is.
     pub fn verdict(self, phase: RidePhase, is_confirmed: bool) -> RideVerdict {
         use RideVerdict::{Pending, Reached, Refused};

@@ -180,5 +180,5 @@ fn asked(endpoint: &Endpoint) -> Option<State> {
     let Attempt::Connected(mut connection) = endpoint.connect().ok()? else { return None };
     connection.send(&RequestLine::new("status")).ok()?;
     let answer = connection.receive(Instant::now() + SOCKET_LIMIT, || false).ok()??;
-    State::ALL.into_iter().find(|state| endpoint.counts(&connection) && state.name() == answer.state)
+    State::by_name(&answer.state).filter(|_| endpoint.counts(&connection))
 }

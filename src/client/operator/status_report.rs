@@ -8,25 +8,21 @@ use super::ride::{RideOrder, RidePhase};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatusReport {
     /// Version, commit and build profile of the daemon.
-    #[serde(default)]
     pub version: String,
     /// Name of the machine.
     pub machine: String,
     /// Process of the daemon.
     pub process_id: u32,
-    /// Stops so far, for requests that may lead to control; `None` if the daemon is older than this field.
-    #[serde(default)]
+    /// Stops so far, for requests that may lead to control; `None` if the daemon has not answered.
     pub stops: Option<StopNumber>,
     /// Problems of the host, each with its remedy.
-    #[serde(default)]
     pub warnings: Vec<String>,
     /// The configuration in force.
-    #[serde(default)]
     pub configuration: ConfigurationReport,
     /// Age of the described cycle \[s\]; `None` before the first.
     pub age_s: Option<f64>,
-    /// `limits.scale`; `None` if the daemon is older than this field.
-    pub limits_scale: Option<f64>,
+    /// `limits.scale`.
+    pub limits_scale: f64,
     /// Names of the limits that the cycle has reached or nearly reached.
     pub active_limits: Vec<String>,
     /// Rate and missed deadlines.
@@ -36,12 +32,10 @@ pub struct StatusReport {
     /// X of the newest setpoint; `None` if none ever arrived, or if it is not finite.
     pub setpoint: Option<[f64; 6]>,
     /// X of the target that is followed or held; `None` if the newest setpoint is no target, or without control.
-    #[serde(default)]
     pub target: Option<[f64; 6]>,
-    /// Whether the platform is in position; `None` if the daemon is older than this field.
-    pub in_position: Option<bool>,
+    /// Whether the platform is in position.
+    pub in_position: bool,
     /// Distance \[m\] and angle \[rad\] from the pose to the newest setpoint; `None` if one of them is unknown.
-    #[serde(default)]
     pub setpoint_distance: Option<[f64; 2]>,
     /// Reference minus measured under control, else setpoint minus measured \[m\].
     pub position_error_m: Option<[f64; 3]>,
@@ -58,7 +52,6 @@ pub struct StatusReport {
     /// `actuator.min_length_m` and `actuator.max_length_m`.
     pub stroke_m: [f64; 2],
     /// Smallest length and angle that are worth showing \[m\], \[rad\]; from the noise of the lengths and the size of the machine.
-    #[serde(default)]
     pub resolution: [f64; 2],
     /// `actuator.max_force_n`.
     pub max_force_n: f64,
@@ -121,7 +114,7 @@ pub struct LegReport {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
-pub(super) fn is_false(value: &bool) -> bool {
+fn is_false(value: &bool) -> bool {
     !value
 }
 
@@ -140,7 +133,6 @@ pub struct SourceReport {
     /// Processes that publish now.
     pub processes: Vec<ProcessReport>,
     /// Reasons why messages were rejected independently of their content, with the remedy.
-    #[serde(default)]
     pub rejected: Option<String>,
 }
 
@@ -154,18 +146,17 @@ pub struct ProcessReport {
     /// User of the process, empty if it has ended.
     pub user: String,
     /// Whether its messages are ignored, because another process is used.
-    #[serde(default)]
     pub is_ignored: bool,
     /// Whether it lives and runs no more, by SIGSTOP or a debugger: it obeys neither SIGINT nor SIGTERM.
     #[serde(default, skip_serializing_if = "is_false")]
     pub is_stopped: bool,
     /// What it says of its own input, as of datagrams that it did not follow.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<String>,
     /// What it does, if persons ride.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ride: Option<RidePhase>,
     /// What the operator wants of it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ride_order: Option<RideOrder>,
 }

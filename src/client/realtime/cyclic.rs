@@ -51,32 +51,19 @@ impl Timing {
     }
 }
 
-/// Release mode: what begins a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ReleaseMode {
-    /// A point of the grid, for which the thread sleeps.
-    Sleep,
-    /// A point of the grid, for which the thread sleeps and then spins.
-    Hybrid,
-    /// A measured message, signalled by the I/O thread.
-    External,
-    /// A measured message and the setpoint of its instant, in simulated time, which does not advance without messages.
-    Lockstep,
-}
-
-impl ReleaseMode {
-    /// All modes.
-    pub const ALL: [Self; 4] = [Self::Sleep, Self::Hybrid, Self::External, Self::Lockstep];
-
-    /// Name in the configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sleep => "sleep",
-            Self::Hybrid => "hybrid",
-            Self::External => "external",
-            Self::Lockstep => "lockstep",
-        }
+hexad_core::named! {
+    /// Release mode: what begins a cycle.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum ReleaseMode {
+        /// A point of the grid, for which the thread sleeps.
+        Sleep => "sleep",
+        /// A point of the grid, for which the thread sleeps and then spins.
+        Hybrid => "hybrid",
+        /// A measured message, signalled by the I/O thread.
+        External => "external",
+        /// A measured message and the setpoint of its instant, in simulated time, which does not advance without messages.
+        Lockstep => "lockstep",
     }
 }
 

@@ -1,12 +1,13 @@
 //! Signals that pause what this process plays (SIGUSR1) and let it go on (SIGUSR2).
 
 use core::ffi::c_int;
-use core::ptr;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::fs::read_to_string;
 use std::io;
 
 use nix::sys::signal::Signal;
+
+use super::process::handle_signal;
 
 /// Whether the last of both was SIGUSR1.
 static IS_PAUSED: AtomicBool = AtomicBool::new(false);
@@ -19,18 +20,8 @@ impl PauseRequest {
     /// Installs the handlers. Once per process.
     pub fn on_signals() -> io::Result<Self> {
         for number in [libc::SIGUSR1, libc::SIGUSR2] {
-            // SAFETY: an all-zero `sigaction` is valid and is filled before use. The handler stores an atomic flag, which may
-            // be done in one. A null pointer for the old action is allowed.
-            let result = unsafe {
-                let mut action: libc::sigaction = core::mem::zeroed();
-                action.sa_sigaction = handle as extern "C" fn(c_int) as libc::sighandler_t;
-                action.sa_flags = libc::SA_RESTART;
-                libc::sigemptyset(&mut action.sa_mask);
-                libc::sigaction(number, &action, ptr::null_mut())
-            };
-            if result != 0 {
-                return Err(io::Error::last_os_error());
-            }
+            // SAFETY: the handler stores an atomic flag.
+            unsafe { handle_signal(number, handle) }?;
         }
         Ok(Self(()))
     }

@@ -1,5 +1,25 @@
 //! Child processes, and the signals of this process.
 
+use core::ffi::c_int;
+use std::io;
+
+/// Handles a signal of this process. A system call that it interrupts continues.
+///
+/// # Safety
+///
+/// The handler must do only what may be done in one: atomic operations, `clock_gettime`.
+pub(super) unsafe fn handle_signal(signal: c_int, handler: extern "C" fn(c_int)) -> io::Result<()> {
+    // SAFETY: an all-zero `sigaction` is valid and is filled before use. A null pointer for the old action is allowed.
+    let result = unsafe {
+        let mut action: libc::sigaction = core::mem::zeroed();
+        action.sa_sigaction = handler as libc::sighandler_t;
+        action.sa_flags = libc::SA_RESTART;
+        libc::sigemptyset(&mut action.sa_mask);
+        libc::sigaction(signal, &action, core::ptr::null_mut())
+    };
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
 /// Sends SIGTERM to a process.
 pub fn terminate(process_id: u32) {
     // SAFETY: plain numbers. The caller holds the child unreaped, so the number is still its own.

@@ -5,6 +5,7 @@ use core::ptr;
 use core::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 use std::io;
 
+use super::process::handle_signal;
 use super::request_word::RequestWord;
 use crate::messages::clock::monotonic_ns;
 
@@ -18,18 +19,8 @@ pub fn post_on_signals(word: &'static RequestWord, requests: [u32; 2]) -> io::Re
     REQUESTS.iter().zip(requests).for_each(|(stored, request)| stored.store(request, Ordering::Relaxed));
     WORD.store(ptr::from_ref(word).cast_mut(), Ordering::Release);
     for signal in [libc::SIGUSR1, libc::SIGUSR2] {
-        // SAFETY: an all-zero `sigaction` is valid and is filled before use. The handler calls only what may be called in
-        // one: atomic operations and clock_gettime. A null pointer for the old action is allowed.
-        let result = unsafe {
-            let mut action: libc::sigaction = core::mem::zeroed();
-            action.sa_sigaction = handle as extern "C" fn(c_int) as libc::sighandler_t;
-            action.sa_flags = libc::SA_RESTART;
-            libc::sigemptyset(&mut action.sa_mask);
-            libc::sigaction(signal, &action, ptr::null_mut())
-        };
-        if result != 0 {
-            return Err(io::Error::last_os_error());
-        }
+        // SAFETY: the handler calls only atomic operations and clock_gettime.
+        unsafe { handle_signal(signal, handle) }?;
     }
     Ok(())
 }

@@ -1,13 +1,13 @@
 //! Requests to stop by signal (SIGINT, SIGTERM, SIGHUP), counted.
 
 use core::ffi::c_int;
-use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::time::Duration;
 use std::io;
 use std::sync::Arc;
 use std::thread;
 
+use super::process::handle_signal;
 use crate::messages::clock::monotonic_ns;
 
 /// Least time between two signals that are two requests: `timeout`, a terminal and a supervisor each signal a process and its group.
@@ -70,16 +70,9 @@ pub struct Hangups {
 impl Hangups {
     /// Counts SIGHUP from now on; it replaces what [`Stop::on_signals`] has installed.
     pub fn count() -> io::Result<Self> {
-        // SAFETY: an all-zero `sigaction` is valid and is filled before use. The handler adds to an atomic number, which may be
-        // done in one. A null pointer for the old action is allowed.
-        let result = unsafe {
-            let mut action: libc::sigaction = core::mem::zeroed();
-            action.sa_sigaction = count_hangup as extern "C" fn(c_int) as libc::sighandler_t;
-            action.sa_flags = libc::SA_RESTART;
-            libc::sigemptyset(&mut action.sa_mask);
-            libc::sigaction(libc::SIGHUP, &action, ptr::null_mut())
-        };
-        if result == 0 { Ok(Self { seen: 0 }) } else { Err(io::Error::last_os_error()) }
+        // SAFETY: the handler adds to an atomic number.
+        unsafe { handle_signal(libc::SIGHUP, count_hangup) }?;
+        Ok(Self { seen: 0 })
     }
 
     /// Whether one has arrived since the last call.

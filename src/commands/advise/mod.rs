@@ -8,7 +8,7 @@ use clap::builder::PossibleValuesParser;
 
 use self::report::{AdviceReport, FidelityRow, SCHEMA};
 use super::arguments::{GROUP_HELP, MachineFile};
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use super::offline_tables::{read_trajectory, task_state};
 use super::orientation::{OrientationFormat, ROTATION_HELP};
 use super::progress::item_bar;
@@ -66,17 +66,8 @@ impl AdviseArguments {
     }
 }
 
-/// Error that prevents advice.
-#[derive(Debug, thiserror::Error)]
-pub enum AdviseError {
-    #[error("{}: no row can be evaluated: {outside} are outside the actuators' stroke, {singular} at singular poses; correct the trajectory", path.display())]
-    NothingEvaluated { path: PathBuf, outside: u64, singular: u64 },
-}
-
-impl CommandError for AdviseError {}
-
 /// Evaluates the configured envelope or the trajectory of a file.
-fn advise(config: &Config, trajectory: Option<(&Path, &NumberTable)>) -> Result<AdviceReport, AdviseError> {
+fn advise(config: &Config, trajectory: Option<(&Path, &NumberTable)>) -> Result<AdviceReport, Failure> {
     let model = InverseDynamics::new(&config.machine);
     let (scene, comparison, motions) = match trajectory {
         Some((path, table)) => judge_trajectory(&model, path, table)?,
@@ -152,7 +143,7 @@ fn judge_trajectory(
     model: &InverseDynamics,
     path: &Path,
     table: &NumberTable,
-) -> Result<(String, FidelityComparison, Vec<Motion>), AdviseError> {
+) -> Result<(String, FidelityComparison, Vec<Motion>), Failure> {
     let rows = table.rows();
     let (mut tally, bar) = (ErrorStatistics::default(), item_bar(rows.len(), "rows"));
     let every = rows.len().div_ceil(TIMED_MOTIONS);
@@ -169,7 +160,11 @@ fn judge_trajectory(
     bar.finish_and_clear();
     if tally.evaluated == 0 {
         let ErrorStatistics { outside, singular, .. } = tally;
-        return Err(AdviseError::NothingEvaluated { path: path.into(), outside, singular });
+        return Err(Failure::before_start(format_args!(
+            "{}: no row can be evaluated: {outside} are outside the actuators' stroke, {singular} at singular poses; \
+             correct the trajectory",
+            path.display()
+        )));
     }
     let scene = format!("the rows of {}:\n{} motions", path.display(), tally.evaluated);
     Ok((scene, FidelityComparison::of_rows(tally), motions))

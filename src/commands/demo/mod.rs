@@ -1,6 +1,7 @@
 //! `hexad demo`: daemon, plant and setpoint source as real processes, from rest at home through a motion
 //! and back to rest.
 
+use core::fmt;
 use core::time::Duration;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -13,11 +14,10 @@ use self::children::ChildProcess;
 use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
 use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, built_in_motion, duration};
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use super::progress::time_bar;
-use super::report::{self, ReportError, recordings_in};
-use crate::output::svg::ChartError;
-use hexad_client::messages::{PortError, StatusMessage, Subscriber};
+use super::report::{self, recordings_in};
+use hexad_client::messages::{StatusMessage, Subscriber};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::signals::state::State;
 use hexad_core::motion::built_in::BuiltInMotion;
@@ -84,45 +84,27 @@ pub struct DemoArguments {
 
 impl DemoArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        Ok(run(&self, &Stop::on_signals()?)?)
+        run(&self, &Stop::on_signals()?)
     }
 }
 
-/// Error that ends a demonstration, or its bad outcome.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    #[error(transparent)]
-    Port(#[from] PortError),
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error(transparent)]
-    Chart(#[from] ChartError),
-    #[error(transparent)]
-    Report(#[from] ReportError),
-    #[error("cannot run the processes: {0}")]
-    Process(#[from] io::Error),
-    #[error("hexad {0} ended early: {1}")]
-    Ended(&'static str, process::ExitStatus),
-    #[error("the motion did not end within {0:.0} s")]
-    TooLong(f64),
-    #[error("stopped by a signal")]
-    Interrupted,
-    #[error("the demonstration failed: {0}")]
-    Failed(String),
+fn cannot_run(error: io::Error) -> Failure {
+    Failure::after_start(format_args!("cannot run the processes: {error}"))
 }
 
-impl CommandError for DemoError {
-    fn has_begun(&self) -> bool {
-        !matches!(self, Self::Config(_) | Self::File(_) | Self::Port(_))
-    }
+/// The bad outcome of a demonstration.
+fn failed(reason: impl fmt::Display) -> Failure {
+    Failure::after_start(format_args!("the demonstration failed: {reason}"))
+}
+
+fn ended(name: &str, status: process::ExitStatus) -> Failure {
+    Failure::after_start(format_args!("hexad {name} ended early: {status}"))
 }
 
 /// Runs the demonstration, prints its summary and writes its files.
-fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
+fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), Failure> {
     let stage = Stage::new(demo)?;
-    fs::create_dir_all(&demo.charts).map_err(FileError::on(&demo.charts))?;
+    create_folder(&demo.charts)?;
     let performed = stage.perform(demo, stop);
     // The page of a failed demonstration is useful, too.
     let page = stage.write_page(&demo.charts);
@@ -146,10 +128,10 @@ fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     }
     print(format_args!("report           {}\n", page?.display()))?;
     if !report.faults.is_empty() {
-        return Err(DemoError::Failed(format!("{} faults", report.faults.len())));
+        return Err(failed(format_args!("{} faults", report.faults.len())));
     }
     if tracking.count() == 0 {
-        return Err(DemoError::Failed("nothing was recorded".into()));
+        return Err(failed("nothing was recorded"));
     }
     let control = &stage.config.deployment.control;
     let position = (report.tracking.position_max_m, control.engage_position_m.max(MAX_POSITION_ERROR_M));
@@ -157,9 +139,7 @@ fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
         (report.tracking.orientation_max_rad, control.engage_orientation_rad.max(MAX_ORIENTATION_ERROR_RAD));
     for (unit, (error, bound)) in [("m", position), ("rad", orientation)] {
         if error > bound {
-            return Err(DemoError::Failed(format!(
-                "tracking error {error:.3e} {unit} exceeds {bound} {unit}"
-            )));
+            return Err(failed(format_args!("tracking error {error:.3e} {unit} exceeds {bound} {unit}")));
         }
     }
     Ok(())
@@ -178,7 +158,7 @@ struct Stage {
 impl Stage {
     /// Copies the configurations under a unique name, so that a demonstration never meets a daemon in
     /// service, nor another demonstration.
-    fn new(demo: &DemoArguments) -> Result<Self, DemoError> {
+    fn new(demo: &DemoArguments) -> Result<Self, Failure> {
         let (text, place) = read(demo.machine.path())?;
         // Parsed first under its own name, which errors then show.
         let original = Config::parse(&text, &place)?;
@@ -192,7 +172,7 @@ impl Stage {
         Config::parse(&plant_text, &plant_place)?;
 
         let folder = env::temp_dir().join(format!("hexad-demo-{}", process::id()));
-        fs::create_dir_all(&folder).map_err(FileError::on(&folder))?;
+        create_folder(&folder)?;
         let name = format!("{:.40}-demo-{}", original.name, process::id());
         let text = adapted(&text, &name, demo.rate_hz);
         let config = Config::parse(&text, &place)?;
@@ -204,40 +184,43 @@ impl Stage {
             report: folder.join("report.json"),
             folder,
         };
-        write_whole(&stage.controller, text.as_bytes())?;
+        write_whole(&stage.controller, text.as_bytes()).map_err(Failure::before_start)?;
         let plant_text = adapted(&plant_text, &name, demo.rate_hz);
         Config::parse(&plant_text, &plant_place)?;
-        write_whole(&stage.plant, plant_text.as_bytes())?;
+        write_whole(&stage.plant, plant_text.as_bytes()).map_err(Failure::before_start)?;
         Ok(stage)
     }
 
-    fn perform(&self, demo: &DemoArguments, stop: &Stop) -> Result<Recording, DemoError> {
+    fn perform(&self, demo: &DemoArguments, stop: &Stop) -> Result<Recording, Failure> {
         let bus = self.config.join()?;
         let mut recorder = TopicRecorder::new(&bus)?;
         let seconds = format!("{}", demo.seconds);
         let controller = ["--config".as_ref(), self.controller.as_os_str()];
-        let plant = ChildProcess::start("plant", ["--config".as_ref(), self.plant.as_os_str()])?;
+        let plant = ChildProcess::start("plant", ["--config".as_ref(), self.plant.as_os_str()])
+            .map_err(cannot_run)?;
         let records = ["--record".as_ref(), demo.charts.as_os_str()];
         let size =
             ["--record-file-mib", RECORDING_MIB, "--record-total-mib", RECORDING_MIB].map(AsRef::as_ref);
         let report = ["--report".as_ref(), self.report.as_os_str()];
         let daemon =
-            ChildProcess::start("run", controller.into_iter().chain(report).chain(records).chain(size))?;
+            ChildProcess::start("run", controller.into_iter().chain(report).chain(records).chain(size))
+                .map_err(cannot_run)?;
         let setpoints = ChildProcess::start(
             "move",
             controller.into_iter().chain(
                 ["--motion", demo.motion.name(), "--seconds", &seconds, "--engage"].map(AsRef::as_ref),
             ),
-        )?;
+        )
+        .map_err(cannot_run)?;
         let mut processes = vec![plant, daemon, setpoints];
         let watched = watch(&mut processes, &mut recorder, bus.subscriber(8)?, demo.seconds, stop);
         // In reverse order of their start: the setpoint source has ended, the daemon publishes that no force
         // is valid, the plant brakes.
         for process in processes.drain(..).rev() {
             let name = process.name;
-            let status = process.stop()?;
+            let status = process.stop().map_err(cannot_run)?;
             if !status.success() && watched.is_ok() {
-                return Err(DemoError::Ended(name, status));
+                return Err(ended(name, status));
             }
             recorder.poll();
         }
@@ -246,14 +229,14 @@ impl Stage {
 
     /// Gives the recording its final name, replacing the last demonstration's recording, and writes its page.
     /// Returns the path of the page.
-    fn write_page(&self, folder: &Path) -> Result<PathBuf, DemoError> {
+    fn write_page(&self, folder: &Path) -> Result<PathBuf, Failure> {
         let (recording, page) = (folder.join(RECORDING), folder.join(PAGE));
         let name = format!("{}.", self.config.name);
         let Some(file) = recordings_in(folder, &name).pop() else {
-            return Err(ReportError::from(RecordingError::Empty(folder.into())).into());
+            return Err(Failure::after_start(RecordingError::Empty(folder.into())));
         };
         fs::rename(&file, &recording).map_err(FileError::on(&file))?;
-        report::write(&[recording], &page)?;
+        report::write(&[recording], &page).map_err(Failure::after_start)?;
         Ok(page)
     }
 }
@@ -271,21 +254,22 @@ fn watch(
     mut statuses: Subscriber<StatusMessage>,
     seconds: f64,
     stop: &Stop,
-) -> Result<(), DemoError> {
+) -> Result<(), Failure> {
     let started = Instant::now();
     let bar = time_bar(seconds + TYPICAL_OVERHEAD_S);
     loop {
         if stop.is_requested() {
-            return Err(DemoError::Interrupted);
+            return Err(Failure::after_start("stopped by a signal"));
         }
         recorder.poll();
         // Before the status, because the setpoint source ends after a fault.
-        let exits: Vec<_> = processes.iter_mut().map(ChildProcess::exit_status).collect::<Result<_, _>>()?;
+        let exits = processes.iter_mut().map(ChildProcess::exit_status);
+        let exits: Vec<_> = exits.collect::<Result<_, _>>().map_err(cannot_run)?;
         if let Some(status) = statuses.receive_latest()
             && status.state == State::Fault as u32
         {
             let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-            return Err(DemoError::Failed(format!("fault: {diagnostic}")));
+            return Err(failed(format_args!("fault: {diagnostic}")));
         }
         for (process, exit) in processes.iter().zip(exits) {
             match exit {
@@ -293,17 +277,22 @@ fn watch(
                     bar.finish_and_clear();
                     return Ok(());
                 }
-                Some(status) => return Err(DemoError::Ended(process.name, status)),
+                Some(status) => return Err(ended(process.name, status)),
                 None => {}
             }
         }
         let elapsed = started.elapsed();
         if elapsed.as_secs_f64() > seconds + MAX_OVERHEAD_S {
-            return Err(DemoError::TooLong(seconds + MAX_OVERHEAD_S));
+            let longest_s = seconds + MAX_OVERHEAD_S;
+            return Err(Failure::after_start(format_args!("the motion did not end within {longest_s:.0} s")));
         }
         bar.set_position(elapsed.as_millis() as u64);
         thread::sleep(POLL_INTERVAL);
     }
+}
+
+fn create_folder(path: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(path).map_err(FileError::on(path)).map_err(Failure::before_start)
 }
 
 fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {

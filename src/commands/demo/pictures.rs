@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use nalgebra::Vector6;
-
 use super::recording::{Recording, desired_motion, measured_pose};
+use crate::commands::report::signals::{degrees, difference, rate_of_change};
 use crate::output::axis::{need_own_axes, range_of};
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use crate::output::svg::ChartError;
@@ -196,20 +195,16 @@ impl Signals {
         // Accelerations are not measured. They are differences of the rates, over two samples.
         for (before, after) in in_range.clone().zip(in_range.skip(2)) {
             let (t0, t1) = (seconds(before.header.time_ns), seconds(after.header.time_ns));
-            let difference = |a: [f64; 6], b: [f64; 6]| -> [f64; 6] {
-                ((Vector6::from(b) - Vector6::from(a)) / (t1 - t0)).into()
-            };
-            let t = 0.5 * (t0 + t1);
-            push(&mut measured.acceleration, t, degrees(difference(before.twist, after.twist)));
-            push(&mut measured.accel, t, difference(before.length_rate_m_s, after.length_rate_m_s));
+            let (t, dt) = (0.5 * (t0 + t1), t1 - t0);
+            push(&mut measured.acceleration, t, degrees(rate_of_change(before.twist, after.twist, dt)));
+            push(&mut measured.accel, t, rate_of_change(before.length_rate_m_s, after.length_rate_m_s, dt));
         }
         for force in recording.forces.iter().filter(|force| force.valid == 1) {
             push(&mut measured.force, seconds(force.header.time_ns), force.force_n);
         }
         for (message, desired) in recording.force_pairs(period_ns) {
             let commanded = model.forces::<Exact>(&desired.motion()).unwrap_or([f64::NAN; LEGS]);
-            let mut difference = message.force_n;
-            difference.iter_mut().zip(commanded).for_each(|(force, commanded)| *force -= commanded);
+            let difference = difference(message.force_n, commanded);
             push(force_difference, seconds(message.header.time_ns), difference);
         }
         for (message, desired) in recording.pairs() {
@@ -227,9 +222,4 @@ fn push(lines: &mut Lines, t: f64, values: [f64; 6]) {
     for (line, value) in lines.iter_mut().zip(values) {
         line.push((t, value));
     }
-}
-
-/// Converts the angular half to degrees.
-fn degrees([a, b, c, x, y, z]: [f64; 6]) -> [f64; 6] {
-    [a.to_degrees(), b.to_degrees(), c.to_degrees(), x, y, z]
 }

@@ -16,18 +16,18 @@ use self::latency::measured_mode;
 use self::text::TextStyle;
 use self::verdict::{Feasibility, HostConditions, RateVerdict, assess};
 use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, duration};
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use hexad_client::realtime::clock_cost::ClockCost;
 use hexad_client::realtime::cyclic::ReleaseMode;
 use hexad_client::realtime::setup::idle::PmQosRequest;
 use hexad_client::realtime::setup::permissions::Permissions;
 use hexad_client::realtime::setup::refusals::SetupStep;
-use hexad_client::realtime::setup::{Shortfall, idle, memory};
+use hexad_client::realtime::setup::{idle, memory};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_daemon::nanoseconds;
 use hexad_daemon::start::prepare_loop;
+use hexad_machine::config::Config;
 use hexad_machine::config::deployment::{Deployment, Realtime, Scheduler};
-use hexad_machine::config::{Config, ConfigError};
 use hexad_machine::text::files::{FileError, print, print_json, write_json};
 
 pub mod facts;
@@ -63,38 +63,7 @@ pub struct DoctorArguments {
 
 impl DoctorArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        Ok(run(&self, &Stop::on_signals()?)?)
-    }
-}
-
-/// Error that prevents a diagnosis, or the diagnosis that the configured rate is impossible.
-#[derive(Debug, thiserror::Error)]
-pub enum DoctorError {
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    #[error("{0}")]
-    Cpu(Shortfall),
-    #[error(
-        "--cpu must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)"
-    )]
-    CpuWithDeadline,
-    #[error(
-        "not measured: it would delay the controller of process {0}; stop that, choose another --cpu, or add --disturb"
-    )]
-    ControllerRuns(u32),
-    #[error("cannot start a thread: {0}")]
-    Thread(#[from] io::Error),
-    #[error("stopped by a signal")]
-    Interrupted,
-    #[error(transparent)]
-    Report(#[from] FileError),
-    #[error("{rate_hz} Hz by {} is not possible on this host", release.name())]
-    Impossible { rate_hz: f64, release: ReleaseMode },
-}
-
-impl CommandError for DoctorError {
-    fn has_begun(&self) -> bool {
-        matches!(self, Self::Impossible { .. } | Self::Interrupted)
+        run(&self, &Stop::on_signals()?)
     }
 }
 
@@ -118,7 +87,7 @@ pub struct Diagnosis {
 }
 
 /// Examines the host, measures, and prints facts and verdicts.
-fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
+fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), Failure> {
     let config = match doctor.machine.path() {
         Some(path) => Config::load(path)?,
         None => Config::parse(DEFAULT_CONFIG, DEFAULT_CONFIG_NAME)?,
@@ -141,10 +110,12 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
     let controller = running::controllers(host, realtime.cpu).first().copied();
     if let Some(process) = controller.filter(|_| !doctor.disturb) {
         show(doctor, &style, &diagnosis)?;
-        return Err(DoctorError::ControllerRuns(process));
+        return Err(Failure::before_start(format_args!(
+            "not measured: it would delay the controller of process {process}; stop that, choose another --cpu, or add --disturb"
+        )));
     }
-    let latencies =
-        latency::measure_all(host, &deployment, doctor.seconds, stop)?.ok_or(DoctorError::Interrupted)?;
+    let latencies = latency::measure_all(host, &deployment, doctor.seconds, stop).map_err(no_thread)?;
+    let latencies = latencies.ok_or_else(|| Failure::after_start("stopped by a signal"))?;
     let is_bad = |fact: &&Fact| fact.assessment == Assessment::Bad;
     let conditions = HostConditions {
         longest_hold_ns: nanoseconds(deployment.timeouts.measured_s),
@@ -159,7 +130,10 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
     show(doctor, &style, &diagnosis)?;
     match verdict {
         Feasibility::Good | Feasibility::Marginal => Ok(()),
-        Feasibility::Impossible => Err(DoctorError::Impossible { rate_hz, release }),
+        Feasibility::Impossible => {
+            let release = release.name();
+            Err(Failure::after_start(format_args!("{rate_hz} Hz by {release} is not possible on this host")))
+        }
     }
 }
 
@@ -180,24 +154,31 @@ fn with_cpu(
     configured: &Realtime,
     cpu: Option<usize>,
     permissions: &Permissions,
-) -> Result<Realtime, DoctorError> {
+) -> Result<Realtime, Failure> {
     let Some(cpu) = cpu else { return Ok(configured.clone()) };
     if configured.scheduler == Scheduler::Deadline {
-        return Err(DoctorError::CpuWithDeadline);
+        return Err(Failure::before_start(
+            "--cpu must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)",
+        ));
     }
     match permissions.refusal_of(&SetupStep::Cpu(cpu)) {
-        Some(shortfall) => Err(DoctorError::Cpu(shortfall)),
+        Some(shortfall) => Err(Failure::before_start(shortfall)),
         None => Ok(Realtime { cpu: Some(cpu), ..configured.clone() }),
     }
 }
 
+fn no_thread(error: io::Error) -> Failure {
+    Failure::before_start(format_args!("cannot start a thread: {error}"))
+}
+
 /// Requests all rights that the daemon requests. The rights of a thread are requested on a separate thread, which then
 /// ends. Rights of the process last until it ends, or until the result is dropped.
-fn request_rights(realtime: &Realtime) -> Result<(RefusedRights, Option<PmQosRequest>), DoctorError> {
+fn request_rights(realtime: &Realtime) -> Result<(RefusedRights, Option<PmQosRequest>), Failure> {
     let thread = thread::scope(|threads| {
         let thread = thread::Builder::new().spawn_scoped(threads, || prepare_loop(realtime, || ()))?;
         thread.join().map_err(|_| io::Error::other("it has died"))
-    })?;
+    })
+    .map_err(no_thread)?;
     let (idle_bound, refused_bound) = match idle::limit_wakeup_latency(realtime.cpu_dma_latency_us) {
         Ok(bound) => (Some(bound), None),
         Err(shortfall) => (None, Some(shortfall)),

@@ -9,7 +9,7 @@ use clap::Args;
 use self::plan::PlanText;
 use self::pose_options::PoseOptions;
 use self::table::TableOptions;
-use super::arguments::{MachineFile, duration, number_within};
+use super::arguments::{EngageOptions, MachineFile, number_within};
 use super::failure::Failure;
 use super::frame_options::{FrameOptions, UnitOptions};
 use super::motion_client::MotionClient;
@@ -54,14 +54,10 @@ pub struct GotoArguments {
     #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Compute the way and its duration; move nothing. Without a daemon it begins at home
-    #[arg(long)]
+    #[arg(long, conflicts_with = "engage")]
     dry_run: bool,
-    /// Take control, if the platform is not under control
-    #[arg(long, conflicts_with = "dry_run")]
-    engage: bool,
-    /// Longest to wait for control [s]
-    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
-    within: f64,
+    #[command(flatten)]
+    engage: EngageOptions,
     #[command(flatten)]
     table: TableOptions,
 }
@@ -70,10 +66,8 @@ impl GotoArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let has_target = !self.target.is_empty() || self.home;
         if !has_target && self.table.paths().is_none() {
-            return Err(Failure {
-                exit_code: 2,
-                message: "no target: give coordinates, for example --x 100mm, or --home, or --table".into(),
-            });
+            let text = "no target: give coordinates, for example --x 100mm, or --home, or --table";
+            return Err(Failure::before_start(text));
         }
         let config = self.machine.load()?;
         if let Some(paths) = self.table.paths() {
@@ -102,8 +96,6 @@ impl GotoArguments {
     fn line(&self, config: &Config, target: [Option<f64>; 6]) -> Result<RequestLine, Failure> {
         let [tool, work] = self.frames.fields(config)?;
         Ok(RequestLine {
-            engage: self.engage,
-            within_s: self.within,
             tool,
             work,
             target: Some(TargetFields::new(target)),
@@ -111,7 +103,7 @@ impl GotoArguments {
             home: self.home,
             speed: Some(self.speed),
             tolerance_m: self.tolerance,
-            ..RequestLine::new(GOTO)
+            ..self.engage.line(GOTO)
         })
     }
 

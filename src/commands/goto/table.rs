@@ -102,10 +102,9 @@ impl GotoArguments {
                 exit_code: if exit_code == 2 && visited > before { 1 } else { exit_code },
                 message: format!("{message}\n{rows}; --resume goes on after them"),
             }),
-            Ok(()) if elsewhere > 0 => Err(Failure {
-                exit_code: 1,
-                message: format!("{rows}, {elsewhere} of them not in position (column in_position)"),
-            }),
+            Ok(()) if elsewhere > 0 => Err(Failure::after_start(format!(
+                "{rows}, {elsewhere} of them not in position (column in_position)"
+            ))),
             Ok(()) => {
                 let stands = if visited > before { "; the platform stands under control" } else { "" };
                 Ok(print(format_args!("{rows}, all in position{stands}\n"))?)
@@ -144,12 +143,9 @@ impl Targets<'_> {
         }
         match errors.into_result() {
             Ok(()) => Ok(duration_s),
-            Err(error) => Err(Failure {
-                exit_code: 2,
-                message: format!(
-                    "{error}\nnothing has moved; correct these rows, or add rows for another way"
-                ),
-            }),
+            Err(error) => Err(Failure::before_start(format_args!(
+                "{error}\nnothing has moved; correct these rows, or add rows for another way"
+            ))),
         }
     }
 
@@ -174,11 +170,8 @@ impl Targets<'_> {
         let outcome = rows.into_iter().try_for_each(|(number, (row, line))| -> Result<(), Failure> {
             bar.set_position(number as u64);
             let target = six(row, 1);
-            let request = RequestLine {
-                engage: arguments.engage && number == first,
-                stops,
-                ..arguments.line(config, target.map(Some))?
-            };
+            let request = arguments.line(config, target.map(Some))?;
+            let request = RequestLine { engage: request.engage && number == first, stops, ..request };
             let is_in_position = match client.carry_out(request, |_| Ok(())) {
                 Err(MotionError::TimedOut(text)) if client.status_under_control().is_ok() => {
                     bar.suspend(|| remark(format_args!("line {line}: {text}")));

@@ -1,6 +1,6 @@
 //! `hexad identify`: parameters of a machine from recordings of its motions, and a new machine file with them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -8,7 +8,7 @@ use self::new_values::new_values;
 use self::recordings::Recorded;
 use self::report::{Delay, IdentificationReport, predicted};
 use self::verdict::Verdict;
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use super::machine_file::{changed_margins, difference, edited, write_new};
 use super::quantity::{length, list};
 use hexad_core::model::machine::Machine;
@@ -65,31 +65,21 @@ pub struct IdentifyArguments {
     json: bool,
 }
 
-/// Reason why nothing is identified.
-#[derive(Debug, thiserror::Error)]
-pub enum IdentifyError {
-    #[error(
-        "too little motion under control is recorded; record `hexad excite`, or 20 s or more of another motion of all legs"
-    )]
-    TooLittle,
-    #[error("recordings of two machines: {0} and {1}; identify each alone")]
-    TwoMachines(String, String),
-    #[error(
-        "{0} was recorded with other joints (leg.base_m, leg.platform_m) than the recordings before it; record all with one file"
-    )]
-    OtherJoints(PathBuf),
-    #[error(
-        "{path}: not written, because the model does not hold; most likely {cause}: {remedy}, and record again; --force writes the file nevertheless"
-    )]
-    DoesNotHold { path: PathBuf, cause: String, remedy: &'static str },
-    #[error("--known-mass = {0} kg: must be greater than 0")]
-    Weight(f64),
+/// Why nothing is identified.
+fn too_little() -> Failure {
+    Failure::after_start(
+        "too little motion under control is recorded; record `hexad excite`, or 20 s or more of another motion of all legs",
+    )
 }
 
-impl CommandError for IdentifyError {
-    fn has_begun(&self) -> bool {
-        true
-    }
+/// Why no file is written.
+fn does_not_hold(path: &Path, verdict: &Verdict) -> Failure {
+    let (cause, remedy) = verdict.first();
+    Failure::after_start(format_args!(
+        "{}: not written, because the model does not hold; most likely {cause}: {remedy}, and record again; --force writes the \
+         file nevertheless",
+        path.display()
+    ))
 }
 
 impl IdentifyArguments {
@@ -99,7 +89,7 @@ impl IdentifyArguments {
         let [other, empty, loaded, payload] =
             [&self.validate, &self.recordings, &self.loaded, &self.payload].map(|paths| recorded.read(paths));
         let (other, empty, loaded, payload) = (other?, empty?, loaded?, payload?);
-        let (config, text) = recorded.configuration.ok_or(IdentifyError::TooLittle)?;
+        let (config, text) = recorded.configuration.ok_or_else(too_little)?;
         let machine = &config.machine;
         let known = self.known_weight()?;
         let runs = |delay_s: f64| {
@@ -111,14 +101,13 @@ impl IdentifyArguments {
             .concat()
         };
         let holds_machine = self.recordings.is_empty();
-        let identified =
-            |runs: &[Run]| identify(machine, runs, holds_machine).ok_or(IdentifyError::TooLittle);
+        let identified = |runs: &[Run]| identify(machine, runs, holds_machine).ok_or_else(too_little);
         // The delay shows once masses and friction are about right, and these are exact once the delay is.
         let first = identified(&runs(config.deployment.drive.total_delay_s()))?;
         let mut delay = delay(&config, &first.machine, &empty);
         let runs = runs(delay.used_s);
         let mut found = identified(&runs)?;
-        let examination = found.examine(&runs, delay.deviation_s).ok_or(IdentifyError::TooLittle)?;
+        let examination = found.examine(&runs, delay.deviation_s).ok_or_else(too_little)?;
         delay.widen(examination.delay_deviation_s);
         let verdict = Verdict::new(&examination);
         let validation = runs_of(&other, Load::Empty, delay.used_s);
@@ -136,10 +125,9 @@ impl IdentifyArguments {
         }
         let Some(path) = &self.output else { return Ok(()) };
         let mut new = edited(&text, &new_values(&text, &found, !self.payload.is_empty(), &delay))?;
-        let verdict = report.verdict();
+        let verdict = &report.verdict;
         if !verdict.holds && !self.force {
-            let (cause, remedy) = verdict.first();
-            return Err(IdentifyError::DoesNotHold { path: path.clone(), cause, remedy }.into());
+            return Err(does_not_hold(path, verdict));
         }
         if !verdict.holds {
             new.insert_str(0, &verdict.comment());
@@ -156,10 +144,12 @@ impl IdentifyArguments {
         Ok(())
     }
 
-    fn known_weight(&self) -> Result<Load, IdentifyError> {
+    fn known_weight(&self) -> Result<Load, Failure> {
         let (Some(mass), Some(at)) = (self.known_mass, self.at) else { return Ok(Load::Empty) };
-        let is_valid = mass > 0.0 && mass.is_finite();
-        if is_valid { Ok(Load::Known { mass, at }) } else { Err(IdentifyError::Weight(mass)) }
+        if mass > 0.0 && mass.is_finite() {
+            return Ok(Load::Known { mass, at });
+        }
+        Err(Failure::after_start(format_args!("--known-mass = {mass} kg: must be greater than 0")))
     }
 }
 

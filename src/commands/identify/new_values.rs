@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::quantities::{BODIES, LEG_QUANTITIES, Quantity};
 use super::report::Delay;
 use crate::commands::machine_file::{Estimate, NewNumbers, NewValue, has_table};
 use hexad_core::model::LEGS;
@@ -16,52 +17,13 @@ use hexad_machine::analysis::identification::Identification;
 const STICTION_RATIO: f64 = 0.5;
 const RESIDUALS: f64 = 3.0;
 
-type Path = &'static [&'static str];
-type Number = fn(&Machine, &Platform) -> f64;
+const CENTER: &str = "platform.center_of_mass_m";
 
-/// Numbers of the links and of the drives.
-const NUMBERS: [(Path, Number); 6] = [
-    (&["cylinder", "center_of_mass_m"], |machine, _| machine.cylinder.center_of_mass),
-    (&["cylinder", "axial_inertia_kg_m2"], |machine, _| machine.cylinder.axial_inertia),
-    (&["rod", "mass_kg"], |machine, _| machine.rod.mass),
-    (&["rod", "center_of_mass_m"], |machine, _| machine.rod.center_of_mass),
-    (&["rod", "axial_inertia_kg_m2"], |machine, _| machine.rod.axial_inertia),
-    (&["actuator", "reflected_mass_kg"], |machine, _| machine.actuator.reflected_mass),
-];
-
-/// Numbers of the platform, with the payload.
-const PLATFORM: [(Path, Number); 7] = [
-    (&["platform", "mass_kg"], |machine, payload| joined(machine, payload).mass),
-    (&["platform", "inertia_kg_m2", "xx"], |machine, payload| joined(machine, payload).inertia.m11),
-    (&["platform", "inertia_kg_m2", "yy"], |machine, payload| joined(machine, payload).inertia.m22),
-    (&["platform", "inertia_kg_m2", "zz"], |machine, payload| joined(machine, payload).inertia.m33),
-    (&["platform", "inertia_kg_m2", "xy"], |machine, payload| joined(machine, payload).inertia.m12),
-    (&["platform", "inertia_kg_m2", "xz"], |machine, payload| joined(machine, payload).inertia.m13),
-    (&["platform", "inertia_kg_m2", "yz"], |machine, payload| joined(machine, payload).inertia.m23),
-];
-const CENTER: Path = &["platform", "center_of_mass_m"];
-
-/// Transverse inertia of a link: its key, the key of its constant part where the file has a table, and the link.
-type Across = (Path, Path, fn(&Machine) -> &Link);
+/// Transverse inertia of a link: its key, and the link.
+type Across = (&'static str, fn(&Machine) -> &Link);
 const ACROSS: [Across; 2] = [
-    (
-        &["cylinder", "transverse_inertia_kg_m2"],
-        &["cylinder", "transverse_inertia_kg_m2", "constant_kg_m2"],
-        |machine| &machine.cylinder,
-    ),
-    (
-        &["rod", "transverse_inertia_kg_m2"],
-        &["rod", "transverse_inertia_kg_m2", "constant_kg_m2"],
-        |machine| &machine.rod,
-    ),
-];
-
-type OfLegs = fn(&Machine) -> &[f64; LEGS];
-const OF_LEGS: [(Path, OfLegs); 4] = [
-    (&["actuator", "viscous_friction_n_s_m"], |machine| &machine.actuator.viscous_friction),
-    (&["actuator", "coulomb_friction_n"], |machine| &machine.actuator.coulomb_friction),
-    (&["actuator", "load_friction"], |machine| &machine.actuator.load_friction),
-    (&["actuator", "force_scale"], |machine| &machine.actuator.force_scale),
+    ("cylinder.transverse_inertia_kg_m2", |machine| &machine.cylinder),
+    ("rod.transverse_inertia_kg_m2", |machine| &machine.rod),
 ];
 
 /// All values of an identified machine, for its file. With `has_payload` the payload is a part of the platform.
@@ -71,40 +33,45 @@ pub(super) fn new_values(
     has_payload: bool,
     delay: &Delay,
 ) -> Vec<NewValue> {
-    let estimate = |of: &dyn Fn(&Machine, &Platform) -> f64| {
+    let estimate = |of: &dyn Fn(&Machine) -> f64| {
         let estimated = found.estimate(|machine, payload| {
             let none = Platform { mass: 0.0, ..payload.clone() };
-            of(machine, if has_payload { payload } else { &none })
+            let platform = joined(machine, if has_payload { payload } else { &none });
+            of(&Machine { platform, ..machine.clone() })
         });
         Estimate { value: estimated.value, deviation: estimated.deviation }
     };
-    let one = |path: Path, of: &dyn Fn(&Machine, &Platform) -> f64| NewValue {
-        path,
+    let one = |key: &str, of: &dyn Fn(&Machine) -> f64| NewValue {
+        key: key.into(),
         value: NewNumbers::One(estimate(of)),
     };
-    let array = |path: Path, length: usize, of: &dyn Fn(&Machine, &Platform, usize) -> f64| NewValue {
-        path,
-        value: NewNumbers::Array(
-            (0..length).map(|k| estimate(&|machine, payload| of(machine, payload, k))).collect(),
-        ),
+    let array = |key: &str, length: usize, of: &dyn Fn(&Machine, usize) -> f64| NewValue {
+        key: key.into(),
+        value: NewNumbers::Array((0..length).map(|k| estimate(&|machine| of(machine, k))).collect()),
     };
-    let mut values: Vec<_> = PLATFORM.iter().chain(&NUMBERS).map(|(path, of)| one(path, of)).collect();
-    values.push(array(CENTER, 3, &|machine, payload, axis| {
-        joined(machine, payload).center_of_mass.get(axis).copied().unwrap_or_default()
+    // Neither combinations nor components of an array.
+    let numbers = BODIES.iter().filter(|quantity| !quantity.name.contains([' ', '[']));
+    let number = |quantity: &Quantity| {
+        one(quantity.name, &|machine: &Machine| (quantity.value)(machine, &machine.platform))
+    };
+    let mut values: Vec<_> = numbers.map(number).collect();
+    values.push(array(CENTER, 3, &|machine, axis| {
+        machine.platform.center_of_mass.get(axis).copied().unwrap_or_default()
     }));
-    for (path, constant, link) in ACROSS {
-        let path = if has_table(text, path) { constant } else { path };
-        values.push(one(path, &|machine: &Machine, _: &Platform| link(machine).transverse_inertia.constant));
+    for (key, link) in ACROSS {
+        // Of a table, the constant part.
+        let constant = if has_table(text, key) { format!("{key}.constant_kg_m2") } else { key.into() };
+        values.push(one(&constant, &|machine: &Machine| link(machine).transverse_inertia.constant));
     }
-    for (path, of) in OF_LEGS {
-        values.push(array(path, LEGS, &|machine, _, leg| of(machine).get(leg).copied().unwrap_or_default()));
+    for (key, _, of) in LEG_QUANTITIES {
+        values.push(array(key, LEGS, &|machine, leg| of(machine).get(leg).copied().unwrap_or_default()));
     }
     let unstated = Estimate { value: unstated_friction(found), deviation: 0.0 };
-    values.push(NewValue { path: &["actuator", "friction_uncertainty_n"], value: NewNumbers::One(unstated) });
+    values.push(NewValue { key: "actuator.friction_uncertainty_n".into(), value: NewNumbers::One(unstated) });
     if let Some(shown) = delay.shown {
         let delay_s = (shown.mean.delay_s - delay.lag_s).max(0.0);
         let value = Estimate { value: 1e6 * delay_s, deviation: 1e6 * shown.mean.deviation_s };
-        values.push(NewValue { path: &["drive", "delay_us"], value: NewNumbers::One(value) });
+        values.push(NewValue { key: "drive.delay_us".into(), value: NewNumbers::One(value) });
     }
     values
 }

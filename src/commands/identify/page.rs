@@ -85,11 +85,11 @@ pub(super) fn text(report: &IdentificationReport, machines: [&Machine; 2], predi
         let text = format!("the first {length_s:.0} s of {total_s:.0} s");
         facts.push(Fact { name: "Shown", text, is_bad: false });
     }
-    let title = format!("{}: identification", report.machine());
+    let title = format!("{}: identification", report.machine);
     let summary = plain_text(&title, &facts);
-    let correlated = report.residual_cells().into_iter().zip(report.correlation());
+    let correlated = report.residual_cells().into_iter().zip(report.correlation);
     let head = json(&Head {
-        name: report.machine(),
+        name: &report.machine,
         facts,
         parameters: report.rows().map(Parameter::from).collect(),
         motion: report.predicted_motion(),

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use super::IdentifyError;
 use crate::commands::failure::Failure;
 use hexad_client::messages::CycleMessage;
 use hexad_core::model::LEGS;
@@ -44,11 +43,18 @@ impl Recorded {
         let config = Config::parse(&text, "configuration of the recording")?;
         if let Some((other, _)) = &self.configuration {
             if other.name != config.name {
-                return Err(IdentifyError::TwoMachines(other.name.clone(), config.name).into());
+                return Err(Failure::after_start(format_args!(
+                    "recordings of two machines: {} and {}; identify each alone",
+                    other.name, config.name
+                )));
             }
             // The recorded poses were computed from them.
             if joints(other) != joints(&config) {
-                return Err(IdentifyError::OtherJoints(recording.path().into()).into());
+                return Err(Failure::after_start(format_args!(
+                    "{} was recorded with other joints (leg.base_m, leg.platform_m) than the recordings before it; record all with \
+                     one file",
+                    recording.path().display()
+                )));
             }
         }
         self.configuration = Some((config, text));

@@ -55,7 +55,7 @@ impl Delay {
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct IdentificationReport {
     schema: u32,
-    machine: String,
+    pub machine: String,
     /// Duration of the samples, and number of equations.
     duration_s: f64,
     equations: usize,
@@ -75,9 +75,9 @@ pub(super) struct IdentificationReport {
     /// motion has no two periods.
     after_by_period: Option<[[f64; 2]; LEGS]>,
     /// Correlation of successive residuals.
-    correlation: [f64; LEGS],
+    pub correlation: [f64; LEGS],
     /// Whether the residuals are noise.
-    verdict: Verdict,
+    pub verdict: Verdict,
     /// Least squares of the equations alone, before any prior.
     base_parameters: Option<Vec<BaseParameter>>,
     /// Delay that the motion shows.
@@ -235,16 +235,6 @@ impl IdentificationReport {
         facts
     }
 
-    /// Whether the residuals are noise.
-    pub fn verdict(&self) -> &Verdict {
-        &self.verdict
-    }
-
-    /// Name of the machine.
-    pub fn machine(&self) -> &str {
-        &self.machine
-    }
-
     /// Name of each quantity with its row, in the order of the text.
     pub fn rows(&self) -> impl Iterator<Item = (String, &Row)> {
         let of_legs = LEG_COLUMNS.iter().enumerate().flat_map(|(quantity, name)| {
@@ -267,11 +257,6 @@ impl IdentificationReport {
             [format!("{}", leg + 1), a, b, c, d]
         };
         self.before.iter().zip(&self.after).enumerate().map(cells).collect()
-    }
-
-    /// Correlation of successive residuals of each leg.
-    pub fn correlation(&self) -> &[f64; LEGS] {
-        &self.correlation
     }
 
     fn extent_text(&self) -> String {

@@ -13,7 +13,7 @@ use self::jog_pace::{JogPace, Pace};
 use self::keys::{Key, last_key};
 use self::screen::JogScreen;
 use self::terminal::Terminal;
-use super::arguments::{MachineFile, duration};
+use super::arguments::{EngageOptions, MachineFile};
 use super::failure::Failure;
 use super::frame_options::{FrameOptions, UnitOptions};
 use super::motion_client::{MotionClient, MotionError};
@@ -46,25 +46,21 @@ pub struct JogArguments {
     frames: FrameOptions,
     #[command(flatten)]
     units: UnitOptions,
-    /// Take control, if the platform is not under control
-    #[arg(long)]
-    engage: bool,
-    /// Longest to wait for control [s]
-    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
-    within: f64,
+    #[command(flatten)]
+    engage: EngageOptions,
 }
 
 impl JogArguments {
     pub fn execute(self) -> Result<(), Failure> {
         if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
-            let message = "jog reads keys: standard input and output must be a terminal".into();
-            return Err(Failure { exit_code: 2, message });
+            return Err(Failure::before_start(
+                "jog reads keys: standard input and output must be a terminal",
+            ));
         }
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
         let coordinates = self.frames.coordinates(&config)?;
         let mut client = MotionClient::connect(&config.name, &stop)?;
-        let (engage, within_s) = (self.engage, self.within);
-        client.carry_out(RequestLine { engage, within_s, ..RequestLine::new(HOLD) }, |_| Ok(()))?;
+        client.carry_out(self.engage.line(HOLD), |_| Ok(()))?;
         let [tool, work] = self.frames.fields(&config)?;
         let line = RequestLine { tool, work, ..RequestLine::new("") };
         jog(&mut client, &line, JogPace::new(&config, self.units.units()), &coordinates, &stop)?;
@@ -80,7 +76,7 @@ fn jog(
     coordinates: &Coordinates,
     stop: &Stop,
 ) -> Result<(), Failure> {
-    let terminal = Terminal::open().map_err(|error| Failure { exit_code: 2, message: error.to_string() })?;
+    let terminal = Terminal::open().map_err(Failure::before_start)?;
     let (mut held, mut is_jogging): (Option<(Key, Instant)>, bool) = (None, false);
     let (mut bound, mut drawn) = (String::new(), None::<Instant>);
     while !stop.is_requested() {

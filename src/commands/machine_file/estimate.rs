@@ -3,8 +3,8 @@
 /// A new value of a machine file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NewValue {
-    /// Keys from the top of the file, as in `["platform", "inertia_kg_m2", "xx"]`.
-    pub path: &'static [&'static str],
+    /// Key from the top of the file, as in `platform.inertia_kg_m2.xx`.
+    pub key: String,
     /// What the file states from now on.
     pub value: NewNumbers,
 }

@@ -2,23 +2,21 @@
 
 use toml_edit::{ArrayOfTables, Item, Table, value};
 
-use super::{MachineFileError, array, exchange, parsed, value_of, written};
+use super::{array, exchange, parsed, value_of, written, wrong_type};
+use crate::commands::failure::Failure;
 use hexad_machine::config::frames::NamedFrame;
 
 /// Decimals of angles \[rad\] and positions \[m\]: less than any machine can be placed or measured.
 const DECIMALS: i32 = 12;
 
 /// Text of a machine file with a frame. Everything else stays as it is.
-pub fn with_frame(text: &str, frame: &NamedFrame) -> Result<String, MachineFileError> {
+pub fn with_frame(text: &str, frame: &NamedFrame) -> Result<String, Failure> {
     let mut document = parsed(text)?;
     let pose = array(frame.x.iter().map(|x| number(*x)));
     let sections = document.entry("frame").or_insert(ArrayOfTables::new().into());
     let found = sections.type_name();
-    let sections = sections.as_array_of_tables_mut().ok_or_else(|| MachineFileError::Type {
-        key: "frame".into(),
-        found,
-        expected: "sections [[frame]]",
-    })?;
+    let sections =
+        sections.as_array_of_tables_mut().ok_or_else(|| wrong_type("frame", found, "sections [[frame]]"))?;
     let is_named = |table: &&mut Table| table.get("name").and_then(Item::as_str) == Some(&frame.name);
     let row = sections.iter_mut().find(is_named);
     match row.and_then(|row| row.get_mut("pose")?.as_value_mut()) {

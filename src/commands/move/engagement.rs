@@ -3,7 +3,8 @@
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
-use super::MoveError;
+use super::not_engaged;
+use crate::commands::failure::Failure;
 use crate::commands::request::carry_out_in_background;
 use hexad_client::messages::StatusMessage;
 use hexad_client::operator::connection::Connection;
@@ -62,7 +63,7 @@ impl Engagement {
 
     /// Error if the time has passed, or a stop has come, before the request could be sent, or in step with the setpoints before
     /// control began. `reason` says why it was not sent.
-    pub fn check_time(&mut self, now_ns: u64, reason: &str) -> Result<(), MoveError> {
+    pub fn check_time(&mut self, now_ns: u64, reason: &str) -> Result<(), Failure> {
         let (elapsed, within) = match self {
             Self::Socket { machine, baseline, checked, began, within, result: None, .. } => {
                 if checked.elapsed() > STOP_CHECK_INTERVAL {
@@ -80,11 +81,11 @@ impl Engagement {
         if elapsed <= within {
             return Ok(());
         }
-        Err(MoveError::NotEngaged(within.as_secs_f64(), reason.into()))
+        Err(not_engaged(within, reason))
     }
 
     /// Sends the request while the setpoints hold the pose of the platform. An error if it was refused.
-    pub fn request(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
+    pub fn request(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), Failure> {
         match self {
             Self::None => Ok(()),
             Self::Socket { machine, baseline, began, within, stop, result, .. } => {

@@ -19,29 +19,23 @@ use tracing::info;
 
 use self::engagement::Engagement;
 use self::playback::{Playback, PlaybackStep};
-use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
+use self::trajectory::Trajectory;
 use self::udp::stream::StreamOptions;
 use super::arguments::{GROUP_HELP, MachineFile, built_in_motion, duration};
-use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
+use super::failure::Failure;
 use super::frame_options::FrameOptions;
 use super::orientation::{OrientationFormat, ROTATION_HELP};
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::lockstep::poll_until;
-use hexad_client::messages::{MeasuredMessage, SetpointMessage};
-use hexad_client::messages::{PortError, Publisher, Subscriber};
-use hexad_client::operator::OperatorError;
+use hexad_client::messages::{MeasuredMessage, Publisher, SetpointMessage, Subscriber};
 use hexad_client::realtime::clock::{Grid, sleep_until};
 use hexad_client::realtime::pause_signals::PauseRequest;
 use hexad_client::realtime::stop_request::Stop;
-use hexad_core::control::signals::diagnostic::Diagnostic;
-use hexad_core::control::signals::state::State;
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::built_in::BuiltInMotion;
 use hexad_daemon::nanoseconds;
-use hexad_daemon::precheck::SetpointRefusal;
 use hexad_machine::config::Config;
-use hexad_machine::text::csv_table::{GROUPS, TableError};
-use hexad_machine::text::numbers::percent;
+use hexad_machine::text::csv_table::GROUPS;
 
 mod approach;
 mod engagement;
@@ -94,7 +88,7 @@ pub struct PlaybackOptions {
 impl PlaybackOptions {
     /// Plays the trajectory once.
     pub fn play(&self, config: &Config, trajectory: &Trajectory) -> Result<(), Failure> {
-        Ok(run(config, trajectory, self.hold, self.engage_within(), &Stop::on_signals()?)?)
+        run(config, trajectory, self.hold, self.engage_within(), &Stop::on_signals()?)
     }
 
     fn engage_within(&self) -> Option<Duration> {
@@ -130,23 +124,20 @@ impl MoveArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let config = self.machine.load()?;
         if self.source.pause || self.source.resume {
-            return Ok(pause::request(&config, self.source.pause)?);
+            return pause::request(&config, self.source.pause);
         }
         if self.source.trajectory.is_none() && !self.frames.is_empty() {
-            return Err(Failure {
-                exit_code: 2,
-                message:
-                    "--tool, --work: must go with --trajectory; other motions are about home of the platform"
-                        .into(),
-            });
+            return Err(Failure::before_start(
+                "--tool, --work: must go with --trajectory; other motions are about home of the platform",
+            ));
         }
         if let Some(address) = self.source.udp {
             let stop = Stop::on_signals()?;
             if self.stream.dry_run {
                 config.examine().into_result(&config)?;
-                return Ok(udp::dry_run::run(&config, address, &self.stream, self.seconds, &stop)?);
+                return udp::dry_run::run(&config, address, &self.stream, self.seconds, &stop);
             }
-            return Ok(udp::follow(&config, address, &self.stream, &self.playback, &stop)?);
+            return udp::follow(&config, address, &self.stream, &self.playback, &stop);
         }
         let coordinates = self.frames.coordinates(&config)?;
         let trajectory = match (&self.source.trajectory, self.source.motion) {
@@ -161,65 +152,14 @@ impl MoveArguments {
     }
 }
 
-/// Error that prevents setpoints.
-#[derive(Debug, thiserror::Error)]
-pub enum SetpointError {
-    #[error(transparent)]
-    Port(#[from] PortError),
-    #[error(transparent)]
-    Table(#[from] TableError),
-    #[error(
-        "{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}",
-        share = percent(MIN_AMPLITUDE_SHARE)
-    )]
-    TooSmall { name: &'static str, seconds: f64, refusal: SetpointRefusal },
-    #[error(
-        "no motion about home within the limits shows the parameters: home must be further from the ends \
-         of the stroke and from the bounds of [envelope], or --amplitude larger"
-    )]
-    NotExciting,
+/// Why a motion was not begun in its time.
+fn not_engaged(within: Duration, reason: &str) -> Failure {
+    Failure::after_start(format_args!("not engaged within {} s: {reason}", within.as_secs_f64()))
 }
 
-impl CommandError for SetpointError {}
-
-/// Error that ends a motion.
-#[derive(Debug, thiserror::Error)]
-pub enum MoveError {
-    #[error(transparent)]
-    Port(#[from] PortError),
-    #[error(transparent)]
-    Operator(#[from] OperatorError),
-    #[error("not engaged within {0} s: {1}")]
-    NotEngaged(f64, String),
-    #[error("no player to pause or resume: {0}")]
-    NoPlayer(String),
-    #[error("signals of pause and resume: {0}")]
-    Signals(#[from] io::Error),
-    #[error("interrupted")]
-    Interrupted,
-    #[error("the motion has ended: the daemon is in {state}: {reason}", state = .0.name(), reason = .1)]
-    Ended(State, Diagnostic),
-    #[error("the motion has ended: no status of the daemon any more; is it stopped or killed?")]
-    Silent,
-}
-
-impl CommandError for MoveError {
-    fn has_begun(&self) -> bool {
-        match self {
-            Self::Port(_) | Self::Signals(_) => false,
-            Self::Operator(error) => error.has_begun(),
-            Self::NotEngaged(..) | Self::Ended(..) | Self::Silent | Self::NoPlayer(_) | Self::Interrupted => {
-                true
-            }
-        }
-    }
-
-    fn exit_code(&self) -> u8 {
-        match self {
-            Self::Interrupted => INTERRUPTED,
-            _ => default_exit_code(self),
-        }
-    }
+/// Why pauses and resumptions cannot be signalled.
+fn no_signals(error: io::Error) -> Failure {
+    Failure::before_start(format_args!("signals of pause and resume: {error}"))
 }
 
 /// Plays the trajectory once. After the first signal of `stop` the platform comes to rest along its path;
@@ -231,7 +171,7 @@ fn run(
     is_to_hold: bool,
     engage_within: Option<Duration>,
     stop: &Stop,
-) -> Result<(), MoveError> {
+) -> Result<(), Failure> {
     let bus = config.join()?;
     let engagement = match engage_within {
         None => Engagement::None,
@@ -245,10 +185,10 @@ fn run(
         let began = Instant::now();
         while let Err(reason) = playback.may_join() {
             if stop.is_requested() {
-                return Err(MoveError::Interrupted);
+                return Err(Failure::interrupted("interrupted"));
             }
             if let Some(within) = engage_within.filter(|within| began.elapsed() > *within) {
-                return Err(MoveError::NotEngaged(within.as_secs_f64(), reason));
+                return Err(not_engaged(within, &reason));
             }
             thread::sleep(JOIN_INTERVAL);
         }
@@ -256,7 +196,7 @@ fn run(
     } else {
         run_in_real_time(config, playback, bus.publisher()?, stop)?;
     }
-    if stop.is_requested() { Err(MoveError::Interrupted) } else { Ok(()) }
+    if stop.is_requested() { Err(Failure::interrupted("interrupted")) } else { Ok(()) }
 }
 
 fn run_in_real_time(
@@ -264,8 +204,8 @@ fn run_in_real_time(
     mut playback: Playback,
     mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
-) -> Result<(), MoveError> {
-    let pause = PauseRequest::on_signals()?;
+) -> Result<(), Failure> {
+    let pause = PauseRequest::on_signals().map_err(no_signals)?;
     config.deployment.realtime.prepare_peer_thread();
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
@@ -299,7 +239,7 @@ fn run_in_lockstep(
     mut playback: Playback,
     mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
-) -> Result<(), MoveError> {
+) -> Result<(), Failure> {
     let mut last = None;
     // Without measurements, simulated time does not advance, so nothing can be slowed down.
     while let Some(measurement) = poll_until(|| stop.is_requested(), || measured.receive()) {

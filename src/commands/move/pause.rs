@@ -3,6 +3,7 @@
 //! The player is the process that publishes setpoints, as the daemon's status reports it. The request is a
 //! signal. Only the player's user and root may send it.
 
+use core::fmt::Display;
 use std::fs::read;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -11,7 +12,7 @@ use nix::sys::signal::kill;
 use nix::unistd::Pid;
 use tracing::info;
 
-use super::MoveError;
+use crate::commands::failure::Failure;
 use hexad_client::operator::protocol::AnswerLine as Answer;
 use hexad_client::operator::requests::status;
 use hexad_client::realtime::pause_signals::{handles_pause, pause_signal};
@@ -25,10 +26,10 @@ const REST_LIMIT: Duration = Duration::from_secs(60);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Sends the request. After a pause request, waits until the setpoints are at rest.
-pub fn request(config: &Config, pauses: bool) -> Result<(), MoveError> {
+pub fn request(config: &Config, pauses: bool) -> Result<(), Failure> {
     let player = player(&status(&config.name)?)?;
     kill(Pid::from_raw(player as i32), pause_signal(pauses))
-        .map_err(|error| MoveError::NoPlayer(format!("{} cannot be signalled: {error}", named(player))))?;
+        .map_err(|error| no_player(format_args!("{} cannot be signalled: {error}", named(player))))?;
     if !pauses {
         info!("{} goes on", named(player));
         return Ok(());
@@ -36,7 +37,7 @@ pub fn request(config: &Config, pauses: bool) -> Result<(), MoveError> {
     let (began, mut last, mut since) = (Instant::now(), None, Instant::now());
     while since.elapsed() < REST_TIME {
         if began.elapsed() > REST_LIMIT {
-            return Err(MoveError::NoPlayer(format!("{} does not come to rest", named(player))));
+            return Err(no_player(format_args!("{} does not come to rest", named(player))));
         }
         sleep(POLL_INTERVAL);
         let setpoint = status(&config.name)?.status.and_then(|report| report.setpoint);
@@ -48,24 +49,28 @@ pub fn request(config: &Config, pauses: bool) -> Result<(), MoveError> {
     Ok(())
 }
 
+fn no_player(reason: impl Display) -> Failure {
+    Failure::after_start(format_args!("no player to pause or resume: {reason}"))
+}
+
 /// The process that plays a motion.
-fn player(answer: &Answer) -> Result<u32, MoveError> {
+fn player(answer: &Answer) -> Result<u32, Failure> {
     let report = answer.status.as_deref();
     let sources = report.into_iter().flat_map(|report| &report.sources);
     let processes = sources.filter(|source| source.topic == "setpoint").flat_map(|source| &source.processes);
     let mut alive = processes.filter(|process| !process.command.is_empty());
     let Some(process) = alive.find(|process| !process.is_ignored) else {
-        return Err(MoveError::NoPlayer("no process publishes setpoints".into()));
+        return Err(no_player("no process publishes setpoints"));
     };
     if is_stopped(process.process_id) {
-        return Err(MoveError::NoPlayer(named(process.process_id)));
+        return Err(no_player(named(process.process_id)));
     }
     // Without a handler the signal would end the process.
     if is_player(process.process_id) && handles_pause(process.process_id) {
         return Ok(process.process_id);
     }
     let reason = format!("{} publishes setpoints and is no hexad move", named(process.process_id));
-    Err(MoveError::NoPlayer(reason))
+    Err(no_player(reason))
 }
 
 /// Whether the first argument of a process is `move`.

@@ -3,16 +3,17 @@
 use nalgebra::Vector6;
 use tracing::{info, warn};
 
-use super::MoveError;
 use super::approach::approach_s;
 use super::engagement::Engagement;
 use super::path::Path;
 use super::trajectory::Trajectory;
+use crate::commands::failure::Failure;
 use hexad_client::messages::{StatusMessage, Subscriber};
 use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad_core::control::signals::limits::Limits;
 use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::timeline::Timeline;
 use hexad_daemon::rate_change::RateChange;
@@ -114,7 +115,7 @@ impl<'a> Playback<'a> {
     }
 
     /// Reads all new statuses. An error if control has ended.
-    pub fn receive(&mut self, now_ns: u64) -> Result<(), MoveError> {
+    pub fn receive(&mut self, now_ns: u64) -> Result<(), Failure> {
         while let Some(status) = self.statuses.receive() {
             self.update(now_ns, &status)?;
             self.status = Some(status);
@@ -123,7 +124,7 @@ impl<'a> Playback<'a> {
     }
 
     /// Reads all new statuses and returns the setpoint of an instant.
-    pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
+    pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, Failure> {
         self.receive(now_ns)?;
         let is_followed = matches!(self.phase, Phase::Playing(..) | Phase::Slowing(..) | Phase::Paused(..));
         if is_followed && now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
@@ -174,14 +175,14 @@ impl<'a> Playback<'a> {
     }
 
     fn slowing(&self, path: Path, since_ns: u64, now_ns: u64) -> Phase {
-        let t = seconds(since_ns, now_ns);
+        let t = seconds_since(since_ns, now_ns);
         let slowdown = RateChange::to_rest(t, &self.limits, |t| path.at(t, self.trajectory));
         let then = if self.is_ending { "once more ends at once" } else { "hexad move --resume goes on" };
         info!("slowing down along the path, within {:.1} s; {then}", slowdown.duration_s);
         Phase::Slowing(path, slowdown, now_ns)
     }
 
-    fn update(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
+    fn update(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), Failure> {
         let state = status.state().unwrap_or_default();
         let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
         let is_restarted = self.status.as_ref().is_some_and(|last| last.header.epoch != status.header.epoch);
@@ -197,7 +198,7 @@ impl<'a> Playback<'a> {
     }
 
     /// Before control: holds the pose of the platform, unless the daemon follows another source.
-    fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), MoveError> {
+    fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), Failure> {
         if let (Phase::Standing(timeline), State::Active) = (&self.phase, state) {
             info!("the daemon is in control: moving");
             self.engagement.has_succeeded();
@@ -222,12 +223,12 @@ impl<'a> Playback<'a> {
     }
 
     /// Under control: ends after an operator's request, starts again after a fault.
-    fn follow(&mut self, now_ns: u64, state: State, diagnostic: Diagnostic) -> Result<(), MoveError> {
+    fn follow(&mut self, now_ns: u64, state: State, diagnostic: Diagnostic) -> Result<(), Failure> {
         let by_operator =
             matches!(diagnostic.code, DiagnosticCode::OperatorRequest | DiagnosticCode::EmergencyStop);
         let is_ended = !matches!(state, State::Active | State::Engaging);
         if is_ended && by_operator {
-            return Err(MoveError::Ended(state, diagnostic));
+            return Err(ended(state, &diagnostic));
         }
         if state == State::Active {
             self.last_active_ns = now_ns;
@@ -239,7 +240,7 @@ impl<'a> Playback<'a> {
     }
 
     /// Starts again from the present pose. An error if the platform was to come to rest under control, or nobody waits for it to engage.
-    fn start_over(&mut self) -> Result<(), MoveError> {
+    fn start_over(&mut self) -> Result<(), Failure> {
         if self.ends_with_control || self.is_ending || matches!(self.phase, Phase::Holding(..)) {
             return Err(self.ended());
         }
@@ -249,15 +250,17 @@ impl<'a> Playback<'a> {
     }
 
     /// The error of control that has ended.
-    fn ended(&self) -> MoveError {
+    fn ended(&self) -> Failure {
         let status = self.status.unwrap_or_default();
         match status.state().unwrap_or_default() {
-            state if state.has_control() => MoveError::Silent,
-            state => MoveError::Ended(state, status.diagnostic.diagnostic().unwrap_or_default()),
+            state if state.has_control() => Failure::after_start(
+                "the motion has ended: no status of the daemon any more; is it stopped or killed?",
+            ),
+            state => ended(state, &status.diagnostic.diagnostic().unwrap_or_default()),
         }
     }
 
-    fn setpoint(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
+    fn setpoint(&mut self, now_ns: u64) -> Result<PlaybackStep, Failure> {
         let motion = |task| Ok(PlaybackStep::Setpoint(Setpoint::motion(now_ns, task)));
         match &self.phase {
             Phase::Waiting => {
@@ -276,7 +279,7 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Playing(path, since_ns) => {
-                let t = seconds(*since_ns, now_ns);
+                let t = seconds_since(*since_ns, now_ns);
                 let task = path.at(t, self.trajectory);
                 match path.has_ended(t) {
                     true if self.is_to_hold => self.phase = Phase::Holding(task, now_ns),
@@ -286,7 +289,7 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Slowing(path, slowdown, since_ns) => {
-                let since_s = seconds(*since_ns, now_ns);
+                let since_s = seconds_since(*since_ns, now_ns);
                 let task = slowdown.at(since_s, |t| path.at(t, self.trajectory));
                 if slowdown.has_ended(since_s) {
                     self.phase = if self.is_ending {
@@ -304,7 +307,7 @@ impl<'a> Playback<'a> {
     }
 
     /// The pose of a task as a target, until the platform is in position there.
-    fn hold(&self, now_ns: u64, task: &TaskState, held_ns: u64) -> Result<PlaybackStep, MoveError> {
+    fn hold(&self, now_ns: u64, task: &TaskState, held_ns: u64) -> Result<PlaybackStep, Failure> {
         if now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
             return Err(self.ended());
         }
@@ -323,7 +326,7 @@ impl<'a> Playback<'a> {
 
     /// Begins where the platform is held for a source that has ended. Otherwise logs why there is no setpoint yet.
     /// An error if that takes too long.
-    fn wait(&mut self, now_ns: u64) -> Result<(), MoveError> {
+    fn wait(&mut self, now_ns: u64) -> Result<(), Failure> {
         let reason = match &self.status {
             None => "no status of a daemon".into(),
             Some(status) if status.state().is_some_and(State::has_control) => {
@@ -360,6 +363,7 @@ impl<'a> Playback<'a> {
     }
 }
 
-fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+fn ended(state: State, reason: &Diagnostic) -> Failure {
+    let state = state.name();
+    Failure::after_start(format_args!("the motion has ended: the daemon is in {state}: {reason}"))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tracing::info;
 
-use super::SetpointError;
+use crate::commands::failure::Failure;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::commands::orientation::OrientationFormat;
 use crate::commands::progress::time_bar;
@@ -36,6 +36,9 @@ pub(super) const MIN_AMPLITUDE_SHARE: f64 = 1e-3;
 /// Duration of the fast motion at the end of an excitation, which shows the delay of the drives \[s\].
 const DELAY_MOTION_S: f64 = 10.0;
 
+const NOT_EXCITING: &str = "no motion about home within the limits shows the parameters: home must be further from the ends \
+    of the stroke and from the bounds of [envelope], or --amplitude larger";
+
 /// X, X', X'' as a function of time, from rest to rest.
 #[derive(Clone, Debug)]
 pub enum Trajectory {
@@ -48,11 +51,11 @@ pub enum Trajectory {
 
 impl Trajectory {
     /// A built-in motion, as large as the drives allow and the daemon accepts.
-    pub fn built_in(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, SetpointError> {
+    pub fn built_in(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, Failure> {
         Ok(Self::BuiltIn(Self::fitted(config, motion, seconds)?))
     }
 
-    fn fitted(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<FittedMotion, SetpointError> {
+    fn fitted(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<FittedMotion, Failure> {
         let largest = fit(&config.machine, motion, seconds);
         let smallest = MIN_AMPLITUDE_SHARE / largest.angle_share;
         let sized = |share| {
@@ -68,11 +71,11 @@ impl Trajectory {
         periods: u32,
         amplitude: f64,
         seed: u64,
-    ) -> Result<Excitation, SetpointError> {
+    ) -> Result<Excitation, Failure> {
         let machine = &config.machine;
         let precheck = Precheck::new(config).with_reserve();
         let design = design(machine, amplitude, seed, |state| precheck.keeps_limits(state))
-            .ok_or(SetpointError::NotExciting)?;
+            .ok_or_else(|| Failure::before_start(NOT_EXCITING))?;
         let delay_motion = Self::fitted(config, BuiltInMotion::Sines, DELAY_MOTION_S)?.smaller(amplitude);
         let largest = Excitation::new(machine, design.series, periods, delay_motion);
         let sized = |share| {
@@ -91,7 +94,7 @@ impl Trajectory {
         path: &Path,
         group: Option<&str>,
         format: OrientationFormat,
-    ) -> Result<Self, SetpointError> {
+    ) -> Result<Self, Failure> {
         let home = config.machine.home;
         let table = read_trajectory(path, group, format, &coordinates.tool_x(&home))?;
         let path = name_of(path);
@@ -136,7 +139,7 @@ impl Trajectory {
     }
 
     /// A trajectory from a table with its columns. Error texts use the name `path`.
-    pub fn from_rows(table: &NumberTable, path: &Path) -> Result<Self, SetpointError> {
+    pub fn from_rows(table: &NumberTable, path: &Path) -> Result<Self, TableError> {
         let mut errors = TableErrors::new(path);
         let knots: Vec<_> =
             table.rows().iter().map(|row| Knot { t: time(row), state: task_state(row) }).collect();
@@ -200,12 +203,15 @@ fn accepted_share<M: Fn(f64) -> TaskState>(
     seconds: f64,
     smallest: f64,
     sized: impl Fn(f64) -> M,
-) -> Result<f64, SetpointError> {
+) -> Result<f64, Failure> {
     let precheck = Precheck::new(config).with_reserve();
     let refusal = |share: f64| precheck.refusal(sized(share), [0.0, seconds]);
     let Some(too_large) = refusal(1.0) else { return Ok(1.0) };
     if let Some(refusal) = refusal(smallest) {
-        return Err(SetpointError::TooSmall { name, seconds, refusal });
+        let share = percent(MIN_AMPLITUDE_SHARE);
+        return Err(Failure::before_start(format_args!(
+            "{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}"
+        )));
     }
     let share = edge(0.0, 1.0, |share| refusal(share).is_none());
     info!("{name} with {} of the amplitude that the drives carry: with more, at {too_large}", percent(share));
@@ -233,7 +239,7 @@ mod tests {
         format!("{t},0,0,0,{x},0,0{}\n", ",0".repeat(12))
     }
 
-    fn read(rows: &[String]) -> Result<Trajectory, SetpointError> {
+    fn read(rows: &[String]) -> Result<Trajectory, TableError> {
         let text = trajectory_columns().join(",") + "\n" + &rows.concat();
         let path = Path::new("x.csv");
         let table = NumberTable::from_reader(text.as_bytes(), path, &trajectory_columns(), &[]).unwrap();

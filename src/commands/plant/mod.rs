@@ -11,7 +11,7 @@ use tracing::{debug, info, warn};
 
 use self::other_driver::other_driver;
 use self::validation::ForceValidation;
-use crate::commands::failure::CommandError;
+use crate::commands::failure::Failure;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::lockstep::{REPEAT_INTERVAL, poll_until};
 use hexad_client::messages::{Bus, ForceMessage, MeasuredMessage, PortError, Publisher, Subscriber};
@@ -44,29 +44,17 @@ const ALL_LEGS: u32 = (1 << LEGS) - 1;
 /// continues from now, because all participants would wait for the simulation.
 const MAX_PAUSE_NS: u64 = 1_000_000_000;
 
-/// Error that prevents or ends a plant.
-#[derive(Debug, thiserror::Error)]
-pub enum PlantError {
-    #[error(transparent)]
-    Port(#[from] PortError),
-    #[error("{driver} already publishes measurements of {machine}: end it first")]
-    DriverLives { driver: String, machine: String },
-}
-
-impl CommandError for PlantError {}
-
 /// Runs the plant until `stop`.
-pub fn run(config: &Config, stop: &Stop) -> Result<(), PlantError> {
+pub fn run(config: &Config, stop: &Stop) -> Result<(), Failure> {
     let bus = config.join()?;
     if let Some(driver) = other_driver(config, &bus)? {
-        return Err(PlantError::DriverLives { driver, machine: config.name.clone() });
+        let name = &config.name;
+        return Err(Failure::before_start(format_args!(
+            "{driver} already publishes measurements of {name}: end it first"
+        )));
     }
-    if bus.is_simulated() {
-        run_in_lockstep(config, &bus, stop)?;
-    } else {
-        run_in_real_time(config, &bus, stop)?;
-    }
-    Ok(())
+    let run = if bus.is_simulated() { run_in_lockstep } else { run_in_real_time };
+    Ok(run(config, &bus, stop)?)
 }
 
 fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {

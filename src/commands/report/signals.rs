@@ -160,16 +160,18 @@ pub fn norms(displacement: &Twist) -> (f64, f64) {
 }
 
 /// Converts the angular half to degrees.
-fn degrees([a, b, c, x, y, z]: [f64; 6]) -> [f64; 6] {
+pub fn degrees([a, b, c, x, y, z]: [f64; 6]) -> [f64; 6] {
     [a.to_degrees(), b.to_degrees(), c.to_degrees(), x, y, z]
 }
 
-fn difference(mut of: [f64; 6], less: [f64; 6]) -> [f64; 6] {
+/// Difference of six numbers.
+pub fn difference(mut of: [f64; 6], less: [f64; 6]) -> [f64; 6] {
     of.iter_mut().zip(less).for_each(|(number, less)| *number -= less);
     of
 }
 
-fn rate_of_change(before: [f64; 6], after: [f64; 6], dt: f64) -> [f64; 6] {
+/// Mean rate of change of six numbers in a time \[s\].
+pub fn rate_of_change(before: [f64; 6], after: [f64; 6], dt: f64) -> [f64; 6] {
     difference(after, before).map(|change| change / dt)
 }
 

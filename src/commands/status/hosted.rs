@@ -17,7 +17,7 @@ pub fn show(is_json: bool) -> Result<(), Failure> {
     found.sort_by(|a, b| a.machine.cmp(&b.machine));
     let answers: Vec<_> = found.iter().filter_map(|endpoint| Some((endpoint, answer(endpoint)?))).collect();
     if answers.is_empty() {
-        return Err(Failure { exit_code: 2, message: "no daemon runs on this host".into() });
+        return Err(Failure::before_start("no daemon runs on this host"));
     }
     if is_json {
         let lines: String = answers.iter().map(|(_, answer)| answer.to_line()).collect();

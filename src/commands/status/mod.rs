@@ -52,14 +52,12 @@ impl StatusArguments {
     pub fn execute(self) -> Result<(), Failure> {
         match self.machine.path() {
             Some(path) => self.show_machine(path),
-            None if !self.frames.is_empty() => Err(Failure {
-                exit_code: 2,
-                message: "--tool, --work: name the machine file that has the frames".into(),
-            }),
-            None if !self.units.is_empty() => Err(Failure {
-                exit_code: 2,
-                message: "--units: name the machine whose coordinates are to be shown".into(),
-            }),
+            None if !self.frames.is_empty() => {
+                Err(Failure::before_start("--tool, --work: name the machine file that has the frames"))
+            }
+            None if !self.units.is_empty() => {
+                Err(Failure::before_start("--units: name the machine whose coordinates are to be shown"))
+            }
             None => hosted::show(self.json),
         }
     }

@@ -60,7 +60,7 @@ impl fmt::Display for Screen<'_> {
 /// Without a diagnostic: whether the platform has arrived, and while it engages how far the setpoint is.
 fn progress(answer: &AnswerLine, report: &StatusReport) -> String {
     match report.setpoint_distance {
-        _ if report.in_position == Some(true) => "in position".into(),
+        _ if report.in_position => "in position".into(),
         Some(distance) if answer.state == State::Engaging.name() => {
             let [length, angle] = distance;
             format!("the setpoint is {} and {} away", readable(length, LENGTHS), readable(angle, ANGLES))
@@ -83,8 +83,7 @@ fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     let timing = &report.timing;
     let limits =
         if report.active_limits.is_empty() { "none".into() } else { report.active_limits.join(", ") };
-    let scale =
-        report.limits_scale.map_or_else(String::new, |scale| format!("scale {scale}, reached or near: "));
+    let scale = format!("scale {}, reached or near: ", report.limits_scale);
     write!(f, "{}", paragraph("limits    ", &format!("{scale}{limits}"), WIDTH))?;
     writeln!(
         f,
@@ -227,9 +226,9 @@ pub(in crate::commands) mod tests {
                 loaded_unix_s: 0,
             },
             age_s: Some(0.0011),
-            in_position: Some(false),
+            in_position: false,
             setpoint_distance: Some([0.012_345, 0.001_234]),
-            limits_scale: Some(0.123_456_789),
+            limits_scale: 0.123_456_789,
             active_limits: Limit::ALL.iter().map(|limit| limit.name().into()).collect(),
             timing: TimingReport { rate_hz: 1000.0, cycles: 1_000_000_000, ..TimingReport::default() },
             pose: Some([-3.1, 3.1, -0.0, -1.2345678, 1.1, 0.0]),
@@ -311,7 +310,7 @@ pub(in crate::commands) mod tests {
             "{}",
             Screen(&answer, "", MotionUnits::default())
         );
-        answer.status.as_mut().unwrap().in_position = Some(true);
+        answer.status.as_mut().unwrap().in_position = true;
         assert!(
             Screen(&answer, "", MotionUnits::default()).to_string().contains("\nin position\n"),
             "{}",

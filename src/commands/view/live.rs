@@ -44,7 +44,7 @@ pub struct Live<'a> {
     /// Complete pairs of samples, each with the number of its first.
     pairs: VecDeque<(u64, Level)>,
     counters: LoopCounters,
-    times: LoopTimes,
+    pub times: LoopTimes,
     /// Number of the run, raised when the daemon changes.
     run: u64,
     /// Epoch of the daemon's messages.
@@ -117,11 +117,6 @@ impl<'a> Live<'a> {
         }
         self.add_samples(cycle);
         self.history.forget_before(self.history.length_s() - INTERVALS_S);
-    }
-
-    /// Sets the times since the start of the daemon.
-    pub fn set_times(&mut self, times: &LoopTimes) {
-        self.times = *times;
     }
 
     fn add_samples(&mut self, cycle: &CycleMessage) {

@@ -2,7 +2,6 @@
 //!
 //! It subscribes to the topics as any client does and sends nothing to the daemon.
 
-use std::io;
 use std::sync::{Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
@@ -13,7 +12,7 @@ use self::live::Live;
 use self::server::{Reply, Server};
 use self::topics::Topics;
 use super::arguments::MachineFile;
-use super::failure::{CommandError, Failure};
+use super::failure::Failure;
 use super::frame_options::FrameOptions;
 use super::report::head;
 use crate::output::page::{PageKind, page};
@@ -42,28 +41,6 @@ pub struct ViewArguments {
     frames: FrameOptions,
 }
 
-/// The page cannot be served.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot listen on 127.0.0.1:{port}: {cause}; choose another --port")]
-struct ViewError {
-    port: u16,
-    cause: io::Error,
-}
-
-impl CommandError for ViewError {}
-
-/// Only a daemon of another user runs. Without this error the page would stay empty.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "the daemon of {machine} runs as user {user}, whose topics only {user} can join: run hexad view as that user; hexad status needs no topics"
-)]
-struct ForeignDaemon {
-    machine: String,
-    user: String,
-}
-
-impl CommandError for ForeignDaemon {}
-
 impl ViewArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
@@ -71,7 +48,12 @@ impl ViewArguments {
         let mut topics = Topics::join(&config)?;
         check_user(&config.name)?;
         let live = Mutex::new(Live::new(&config, coordinates.clone()));
-        let server = Server::start(self.port).map_err(|cause| ViewError { port: self.port, cause })?;
+        let server = Server::start(self.port).map_err(|cause| {
+            let port = self.port;
+            Failure::before_start(format_args!(
+                "cannot listen on 127.0.0.1:{port}: {cause}; choose another --port"
+            ))
+        })?;
         print(format_args!("{}\n", server.address()))?;
         remark("open this address in a browser on this host; Ctrl-C ends it");
         std::thread::scope(|scope| {
@@ -84,7 +66,7 @@ impl ViewArguments {
                 let cycles = topics.cycles();
                 if !cycles.is_empty() {
                     let mut live = live.lock().unwrap_or_else(PoisonError::into_inner);
-                    live.set_times(&topics.statistics.total);
+                    live.times = topics.statistics.total;
                     cycles.iter().for_each(|(cycle, status)| live.add(cycle, status));
                 }
                 sleep(POLL_INTERVAL);
@@ -94,13 +76,17 @@ impl ViewArguments {
     }
 }
 
-/// An error if only daemons of other users run, because their topics cannot be joined.
-fn check_user(machine: &str) -> Result<(), ForeignDaemon> {
+/// An error if only daemons of other users run, because their topics cannot be joined: the page would stay empty.
+fn check_user(machine: &str) -> Result<(), Failure> {
     let found = endpoints(Some(machine));
     let foreign = found.iter().find(|it| it.daemon.is_some() && !it.is_own());
     match foreign {
         Some(foreign) if !found.iter().any(Endpoint::is_own) => {
-            Err(ForeignDaemon { machine: machine.into(), user: user_name(foreign.owner) })
+            let user = user_name(foreign.owner);
+            Err(Failure::before_start(format_args!(
+                "the daemon of {machine} runs as user {user}, whose topics only {user} can join: run hexad view as that user; \
+                 hexad status needs no topics"
+            )))
         }
         _ => Ok(()),
     }

@@ -95,49 +95,35 @@ macro_rules! with_terms {
 }
 pub(super) use with_terms;
 
-/// Model fidelity chosen at run time, from gravity only to all terms.
-///
-/// ```
-/// use hexad_core::model::{active_forces::InverseDynamics, fidelity::Fidelity, task::TaskState};
-/// # let machine = hexad_machine::config::Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine;
-/// // Without acceleration and velocity the exact model is no more than gravity.
-/// let (model, rest) = (InverseDynamics::new(&machine), TaskState::at_rest(machine.home).motion());
-/// let [gravity, exact] = [Fidelity::Gravity, Fidelity::Exact].map(|fidelity| model.forces_of(fidelity, &rest).unwrap());
-/// assert!(gravity.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs()));
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fidelity {
-    /// [`struct@Gravity`]
-    Gravity,
-    /// [`struct@MasslessLegs`]
-    MasslessLegs,
-    /// [`struct@LumpedLegs`]
-    LumpedLegs,
-    /// [`struct@NoVelocity`]
-    NoVelocity,
-    /// [`struct@RigidLegs`]
-    RigidLegs,
-    /// [`struct@Exact`]
-    Exact,
+crate::named! {
+    /// Model fidelity chosen at run time, from gravity only to all terms.
+    ///
+    /// ```
+    /// use hexad_core::model::{active_forces::InverseDynamics, fidelity::Fidelity, task::TaskState};
+    /// # let machine = hexad_machine::config::Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine;
+    /// // Without acceleration and velocity the exact model is no more than gravity.
+    /// let (model, rest) = (InverseDynamics::new(&machine), TaskState::at_rest(machine.home).motion());
+    /// let [gravity, exact] = [Fidelity::Gravity, Fidelity::Exact].map(|fidelity| model.forces_of(fidelity, &rest).unwrap());
+    /// assert!(gravity.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs()));
+    /// ```
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Fidelity {
+        /// [`struct@Gravity`]
+        Gravity => "gravity",
+        /// [`struct@MasslessLegs`]
+        MasslessLegs => "massless-legs",
+        /// [`struct@LumpedLegs`]
+        LumpedLegs => "lumped-legs",
+        /// [`struct@NoVelocity`]
+        NoVelocity => "no-velocity",
+        /// [`struct@RigidLegs`]
+        RigidLegs => "rigid-legs",
+        /// [`struct@Exact`]
+        Exact => "exact",
+    }
 }
 
 impl Fidelity {
-    /// All fidelities, from the cheapest to the exact one.
-    pub const ALL: [Self; 6] =
-        [Self::Gravity, Self::MasslessLegs, Self::LumpedLegs, Self::NoVelocity, Self::RigidLegs, Self::Exact];
-
-    /// Name on the command line and in configurations.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gravity => "gravity",
-            Self::MasslessLegs => "massless-legs",
-            Self::LumpedLegs => "lumped-legs",
-            Self::NoVelocity => "no-velocity",
-            Self::RigidLegs => "rigid-legs",
-            Self::Exact => "exact",
-        }
-    }
-
     /// Short description of the omitted terms.
     pub fn left_out_terms(self) -> &'static str {
         match self {

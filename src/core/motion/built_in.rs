@@ -30,46 +30,35 @@ const ANGLE_AMPLITUDE_RAD: f64 = 0.105;
 /// Share of stroke, rate and force a fitted motion may use.
 const USABLE_SHARE: f64 = 0.8;
 
-/// A named motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BuiltInMotion {
-    /// Rest at home.
-    Settle,
-    /// Minimum-jerk moves along every axis.
-    MinimumJerk,
-    /// A sine on every axis.
-    Sines,
-    /// A circle at constant orientation.
-    Circle,
-    /// A spatial curve like that of the paper's section 8.
-    // The paper's own curve is only in a figure; this one replaces it.
-    Paper,
+crate::named! {
+    /// A named motion.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum BuiltInMotion {
+        /// Rest at home.
+        Settle => "settle",
+        /// Minimum-jerk moves along every axis.
+        MinimumJerk => "minimum-jerk",
+        /// A sine on every axis.
+        Sines => "sines",
+        /// A circle at constant orientation.
+        Circle => "circle",
+        /// A spatial curve like that of the paper's section 8.
+        // The paper's own curve is only in a figure; this one replaces it.
+        Paper => "paper",
+    }
 }
 
 impl BuiltInMotion {
-    /// All motions.
-    pub const ALL: [Self; 5] = [Self::Settle, Self::MinimumJerk, Self::Sines, Self::Circle, Self::Paper];
-
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        self.name_and_description().0
-    }
-
-    /// Name, and what the platform does, for a help text.
-    pub fn name_and_description(self) -> (&'static str, &'static str) {
+    /// What the platform does, for a help text.
+    pub fn description(self) -> &'static str {
         match self {
-            Self::Settle => ("settle", "Rest at home"),
-            Self::MinimumJerk => {
-                ("minimum-jerk", "Minimum-jerk moves along every axis in turn, there and back")
+            Self::Settle => "Rest at home",
+            Self::MinimumJerk => "Minimum-jerk moves along every axis in turn, there and back",
+            Self::Sines => "A sine of its own frequency on every axis",
+            Self::Circle => "A circle at constant orientation, in the plane of the second and third axis",
+            Self::Paper => {
+                "A spatial curve at the constant orientation 15, 10, 5 degrees, like the paper's section 8"
             }
-            Self::Sines => ("sines", "A sine of its own frequency on every axis"),
-            Self::Circle => {
-                ("circle", "A circle at constant orientation, in the plane of the second and third axis")
-            }
-            Self::Paper => (
-                "paper",
-                "A spatial curve at the constant orientation 15, 10, 5 degrees, like the paper's section 8",
-            ),
         }
     }
 }

@@ -8,50 +8,37 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3, Vector6}
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::{TaskState, task_coordinates};
 
-/// Order in which the rotations by alpha, beta and gamma are multiplied.
-///
-/// ```
-/// use hexad_core::model::task::TaskState;
-/// use hexad_core::motion::rotation_order::RotationOrder;
-/// let x = [0.0, 0.5, 1.5, 0.0, 0.0, 1.0];
-/// let pose = RotationOrder::Zyx.motion(&TaskState::at_rest(x)).pose;
-/// // Of Rz(gamma) Ry(beta), the third axis has the direction of beta, turned by gamma.
-/// let [alpha, beta, gamma, ..] = RotationOrder::Xyz.coordinates(&pose, &x);
-/// assert!((pose.rotation.m33 - alpha.cos() * beta.cos()).abs() < 1e-15 && (gamma - 1.5).abs() > 1e-3);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RotationOrder {
-    /// `Rx(alpha) Ry(beta) Rz(gamma)`, the order of X
-    #[default]
-    Xyz,
-    /// `Rx(alpha) Rz(gamma) Ry(beta)`
-    Xzy,
-    /// `Ry(beta) Rx(alpha) Rz(gamma)`
-    Yxz,
-    /// `Ry(beta) Rz(gamma) Rx(alpha)`
-    Yzx,
-    /// `Rz(gamma) Rx(alpha) Ry(beta)`
-    Zxy,
-    /// `Rz(gamma) Ry(beta) Rx(alpha)`
-    Zyx,
+crate::named! {
+    /// Order in which the rotations by alpha, beta and gamma are multiplied.
+    ///
+    /// ```
+    /// use hexad_core::model::task::TaskState;
+    /// use hexad_core::motion::rotation_order::RotationOrder;
+    /// let x = [0.0, 0.5, 1.5, 0.0, 0.0, 1.0];
+    /// let pose = RotationOrder::Zyx.motion(&TaskState::at_rest(x)).pose;
+    /// // Of Rz(gamma) Ry(beta), the third axis has the direction of beta, turned by gamma.
+    /// let [alpha, beta, gamma, ..] = RotationOrder::Xyz.coordinates(&pose, &x);
+    /// assert!((pose.rotation.m33 - alpha.cos() * beta.cos()).abs() < 1e-15 && (gamma - 1.5).abs() > 1e-3);
+    /// ```
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum RotationOrder {
+        /// `Rx(alpha) Ry(beta) Rz(gamma)`, the order of X
+        #[default]
+        Xyz => "xyz",
+        /// `Rx(alpha) Rz(gamma) Ry(beta)`
+        Xzy => "xzy",
+        /// `Ry(beta) Rx(alpha) Rz(gamma)`
+        Yxz => "yxz",
+        /// `Ry(beta) Rz(gamma) Rx(alpha)`
+        Yzx => "yzx",
+        /// `Rz(gamma) Rx(alpha) Ry(beta)`
+        Zxy => "zxy",
+        /// `Rz(gamma) Ry(beta) Rx(alpha)`
+        Zyx => "zyx",
+    }
 }
 
 impl RotationOrder {
-    /// All orders.
-    pub const ALL: [Self; 6] = [Self::Xyz, Self::Xzy, Self::Yxz, Self::Yzx, Self::Zxy, Self::Zyx];
-
-    /// Name of the order.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Xyz => "xyz",
-            Self::Xzy => "xzy",
-            Self::Yxz => "yxz",
-            Self::Yzx => "yzx",
-            Self::Zxy => "zxy",
-            Self::Zyx => "zyx",
-        }
-    }
-
     /// Motion of a state like a [`TaskState`], with angles and their derivatives in this order.
     ///
     /// P takes the first axis of rotation to x, the second to y, the third to z: `P R P^T` has the order of X. If P is a

@@ -7,6 +7,7 @@ use hexad_core::control::signals::diagnostic::Diagnostic;
 use hexad_core::control::signals::state::State;
 
 use crate::process_names::sentence;
+use crate::snapshot::Snapshot;
 
 /// A request without an answer yet. [`Self::answer`] or [`Self::forget`] must consume it.
 #[derive(Debug)]
@@ -47,17 +48,27 @@ impl Drop for OpenRequest {
     }
 }
 
-/// Answer to a request in a state.
-pub(super) fn answer_line(
-    result: RequestResult,
-    request: &str,
-    state: State,
-    diagnostic: &Diagnostic,
-    text: String,
-) -> AnswerLine {
-    let (request, state) = (request.into(), state.name().into());
-    let diagnostic = diagnostic_report(diagnostic);
-    AnswerLine { version: VERSION, result, request, id: None, state, diagnostic, text, status: None }
+impl Snapshot {
+    pub(super) fn state(&self) -> State {
+        self.status.state().unwrap_or_default()
+    }
+
+    pub(super) fn diagnostic(&self) -> Diagnostic {
+        self.status.diagnostic.diagnostic().unwrap_or_default()
+    }
+
+    /// Answer to a request in this state.
+    pub(super) fn answer(
+        &self,
+        result: RequestResult,
+        request: &str,
+        diagnostic: impl Into<Diagnostic>,
+        text: impl Into<String>,
+    ) -> AnswerLine {
+        let (request, state) = (request.into(), self.state().name().into());
+        let (diagnostic, text) = (diagnostic_report(&diagnostic.into()), text.into());
+        AnswerLine { version: VERSION, result, request, id: None, state, diagnostic, text, status: None }
+    }
 }
 
 /// A diagnostic for answers and reports.

@@ -123,20 +123,13 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
 }
 
 struct Server<'a> {
-    socket: ControlSocket,
-    snapshots: Reader<Snapshot>,
-    word: &'static RequestWord,
-    gate: Arc<PoseGate>,
-    request_reload: Sender<Requester>,
-    reloaded: Receiver<Reloaded>,
+    links: ControlLinks<'a>,
     /// Number of reload requests so far.
     reloads: u64,
-    windows: SyncSender<WindowOrder>,
     motions: Motions,
     /// Numbers of the connections in the last round, and of the last one accepted.
     connection_ids: Vec<u64>,
     accepted: u64,
-    is_ending: &'a AtomicBool,
     connections: Vec<Connection>,
     status: StatusSource,
     /// The present \[ns\].
@@ -158,22 +151,13 @@ struct Server<'a> {
 
 impl<'a> Server<'a> {
     fn new(loaded: Arc<Loaded>, links: ControlLinks<'a>) -> Self {
-        let ControlLinks { socket, snapshots, word, gate, request_reload, reloaded, windows, .. } = links;
         Self {
-            socket,
-            snapshots,
-            word,
-            gate,
-            request_reload,
-            reloaded,
             reloads: 0,
-            windows,
-            motions: Motions::new(links.jobs, links.motion_snapshots),
+            motions: Motions::default(),
             connection_ids: Vec::with_capacity(2 * MAX_CONNECTIONS),
             accepted: 0,
-            is_ending: links.is_ending,
             connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
-            status: StatusSource::new(loaded, links.interruption, links.legs),
+            status: StatusSource::new(loaded, links.interruption.clone(), links.legs.clone()),
             clock: monotonic_ns,
             woke_ns: monotonic_ns(),
             stale_until_ns: 0,
@@ -182,6 +166,7 @@ impl<'a> Server<'a> {
             unserved: 0,
             logged: [None; 2],
             had_control: false,
+            links,
         }
     }
 }
@@ -202,7 +187,7 @@ impl Server<'_> {
 
     /// Waits for input, and closes connections whose client has left.
     fn poll(&mut self, timeout: PollTimeout) {
-        let listeners = core::iter::once(&self.socket.listener).chain(&self.socket.reading);
+        let listeners = core::iter::once(&self.links.socket.listener).chain(&self.links.socket.reading);
         let mut events: Vec<_> = listeners.map(|it| PollFd::new(it.as_fd(), PollFlags::POLLIN)).collect();
         let listeners = events.len();
         events.extend(self.connections.iter().map(|connection| {
@@ -217,7 +202,7 @@ impl Server<'_> {
         };
         let mut gone: Vec<bool> = events.iter().skip(listeners).map(has_left).collect();
         drop(events);
-        let word = self.word;
+        let word = self.links.word;
         let mut gone = gone.drain(..);
         self.connections.retain(|connection| {
             let is_gone =
@@ -237,9 +222,9 @@ impl Server<'_> {
     /// Accepts all waiting clients and reads from each at once, so that a stop does not wait for the lines of
     /// all others. If no more files can be opened, an existing connection is closed.
     fn accept(&mut self) {
-        let snapshot = *self.snapshots.read();
+        let snapshot = *self.links.snapshots.read();
         for _ in 0..MAX_CONNECTIONS {
-            let (stream, may_request) = match self.socket.accept() {
+            let (stream, may_request) = match self.links.socket.accept() {
                 Ok(accepted) => accepted,
                 Err(error) if matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE)) => {
                     if let Some(count) = self.warning() {
@@ -277,14 +262,14 @@ impl Server<'_> {
         let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
         let Some((_, least)) = ranks.min() else { return false };
         let closed = self.connections.swap_remove(least);
-        closed.pending.iter().for_each(|(_, pending)| pending.cancel(self.word));
+        closed.pending.iter().for_each(|(_, pending)| pending.cancel(self.links.word));
         true
     }
 
     /// Reads at most one line of each connection. Stops are carried out at once, other requests a few per
     /// round.
     fn read(&mut self) {
-        let snapshot = *self.snapshots.read();
+        let snapshot = *self.links.snapshots.read();
         let mut connections = core::mem::take(&mut self.connections);
         connections.retain_mut(|connection| self.receive(connection, &snapshot));
         let (mut answered, mut last, mut status) = (0, 0, None);
@@ -347,7 +332,7 @@ impl Server<'_> {
 
     /// Logs each new reason for rejecting messages of a sender.
     fn log_rejections(&mut self) {
-        let snapshot = self.snapshots.read();
+        let snapshot = self.links.snapshots.read();
         self.status.note_drivers(snapshot.measured_publishers);
         let found = [snapshot.setpoint_rejection, snapshot.measured_rejection];
         for ((topic, found), logged) in ["setpoint", "measured"].into_iter().zip(found).zip(&mut self.logged)
@@ -362,7 +347,7 @@ impl Server<'_> {
 
     /// Warns when control begins with legs that are not confirmed.
     fn warn_of_legs(&mut self) {
-        let has_control = self.snapshots.read().status.state().is_some_and(State::has_control);
+        let has_control = self.links.snapshots.read().status.state().is_some_and(State::has_control);
         if !core::mem::replace(&mut self.had_control, has_control) && has_control {
             self.status.leg_warning().into_iter().for_each(|warning| warn!("{warning}"));
         }
@@ -370,11 +355,10 @@ impl Server<'_> {
 
     /// Checks every pending request and answers those that have ended.
     fn advance(&mut self) {
-        let (snapshot, now_ns, word) = (*self.snapshots.read(), (self.clock)(), self.word);
-        let gate = self.gate.clone();
-        let state = snapshot.status.state().unwrap_or_default();
+        let (snapshot, now_ns, word) = (*self.links.snapshots.read(), (self.clock)(), self.links.word);
+        let gate = self.links.gate.clone();
         self.connections.retain_mut(|connection| {
-            let written = connection.pending_file.as_ref().and_then(|(_, file)| file.answer(state));
+            let written = connection.pending_file.as_ref().and_then(|(_, file)| file.answer(&snapshot));
             if let Some(answer) = written
                 && let Some((request, _)) = connection.pending_file.take()
                 && !connection.answer(request, answer)

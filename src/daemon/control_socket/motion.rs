@@ -11,20 +11,17 @@ use super::answer::OpenRequest;
 use super::connection::Connection;
 use super::order::{Order, PendingOrder, REPLACED, Step, stop_count};
 use super::{MAX_WITHIN_S, Server, name_poses};
-use crate::control_socket::answer::answer_line;
 use crate::motion_requests::job::{End, Job, Jog, MotionEvent, MotionInput};
 use crate::motion_requests::order::{Motion, MotionOrder};
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::GOTO;
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
 use hexad_client::realtime::request_word::RequestWord;
-use hexad_client::realtime::triple_buffer::Writer;
 use hexad_core::control::signals::state::Request;
 
-/// Links to the motion thread, and the motion that it carries out.
+/// The motion that the motion thread carries out.
+#[derive(Default)]
 pub struct Motions {
-    jobs: Sender<Job>,
-    snapshots: Writer<Snapshot>,
     pub(super) running: Option<Running>,
     /// The motion that takes over when the running one has ended.
     pub(super) next: Option<(Job, Running)>,
@@ -55,11 +52,6 @@ pub(super) struct Running {
 }
 
 impl Motions {
-    /// No motion.
-    pub fn new(jobs: Sender<Job>, snapshots: Writer<Snapshot>) -> Self {
-        Self { jobs, snapshots, running: None, next: None }
-    }
-
     /// Whether a motion is in progress.
     pub fn is_running(&self) -> bool {
         self.running.is_some()
@@ -105,7 +97,7 @@ impl Server<'_> {
         line: &RequestLine,
         snapshot: &Snapshot,
     ) -> bool {
-        let stops_before = stop_count(self.word, Request::Engage);
+        let stops_before = stop_count(self.links.word, Request::Engage);
         let order = match MotionOrder::of_line(line, &self.status.loaded().config) {
             Ok(order) => order,
             Err(reason) => return connection.answer(request, AnswerLine::invalid(reason)),
@@ -113,7 +105,8 @@ impl Server<'_> {
         if let Some(answer) = self.refusal(line, snapshot) {
             return connection.answer(request, answer);
         }
-        let named = |result, text: String| answer(result, &line.request, snapshot, text);
+        let named =
+            |result, text: String| snapshot.answer(result, &line.request, snapshot.diagnostic(), text);
         let (peer, time_ns) = (connection.peer.clone(), self.woke_ns);
         if let Some(text) = self.motion_of_other(connection.id) {
             return connection.answer(request, named(RequestResult::Refused, text));
@@ -133,7 +126,7 @@ impl Server<'_> {
             running.end(End::TakeOver);
         }
         let is_read = self.supersede_motion(connection, snapshot);
-        let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.word));
+        let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.links.word));
         let is_read =
             is_read & replaced.is_none_or(|(it, order)| connection.answer(it, order.superseded(snapshot)));
         let ((inputs, received), (sent, events)) = (channel(), channel());
@@ -173,12 +166,12 @@ impl Server<'_> {
 
     /// Passes on the newest snapshot, and answers what the motion thread has reported.
     pub(super) fn advance_motion(&mut self) {
-        let snapshot = *self.snapshots.read();
-        self.motions.snapshots.write(snapshot);
+        let snapshot = *self.links.snapshots.read();
+        self.links.motion_snapshots.write(snapshot);
         self.connection_ids.clear();
         self.connection_ids.extend(self.connections.iter().map(|connection| connection.id));
         self.motions.next.take_if(|(_, next)| next.has_left(&self.connection_ids));
-        let word = self.word;
+        let word = self.links.word;
         if let Some((_, mut next)) = self.motions.next.take_if(|(_, next)| next.is_stopped(word)) {
             self.answer_motion(&mut next, RequestResult::Superseded, STOPPED.into(), &snapshot);
         }
@@ -198,7 +191,7 @@ impl Server<'_> {
             return;
         }
         if let Some(engagement) = &running.engagement {
-            engagement.cancel(self.word);
+            engagement.cancel(self.links.word);
         }
         self.answer_motion(&mut running, RequestResult::Superseded, REPLACED.into(), &snapshot);
         self.begin_next();
@@ -208,7 +201,7 @@ impl Server<'_> {
         if let Some((job, running)) = self.motions.next.take() {
             self.motions.running = Some(running);
             // It does not fail, because the motion thread ends after this one.
-            let _ = self.motions.jobs.send(job);
+            let _ = self.links.jobs.send(job);
         }
     }
 
@@ -229,7 +222,7 @@ impl Server<'_> {
                     let (request, stops_before) = (Request::Engage, running.stops_before);
                     let (waits, is_patient, cycle_ns) = (true, true, None);
                     let order = Order { request, stops_before, waits, is_patient, deadline_ns, cycle_ns };
-                    let pending = PendingOrder::post(order, snapshot, self.word, (self.clock)());
+                    let pending = PendingOrder::post(order, snapshot, self.links.word, (self.clock)());
                     running.engagement = Some(pending);
                 }
                 Ok(MotionEvent::Blocked(bound)) => running.blocked = bound.unwrap_or_default(),
@@ -254,7 +247,7 @@ impl Server<'_> {
     /// Checks the wait for control of a motion.
     fn advance_engagement(&mut self, running: &mut Running, snapshot: &Snapshot) {
         let Some(engagement) = &mut running.engagement else { return };
-        let step = engagement.step(snapshot, self.word, (self.clock)());
+        let step = engagement.step(snapshot, self.links.word, (self.clock)());
         let (result, text) = match step {
             Step::Wait => return,
             Step::Progress(line) => return self.report_progress(running, line.result, line.text, snapshot),
@@ -263,11 +256,11 @@ impl Server<'_> {
                 return;
             }
             Step::Answer(mut line) => {
-                name_poses(&self.gate, &mut line);
+                name_poses(&self.links.gate, &mut line);
                 (line.result, format!("engage: {}", line.text))
             }
         };
-        engagement.cancel(self.word);
+        engagement.cancel(self.links.word);
         running.engagement = None;
         running.end(End::AtOnce);
         self.answer_motion(running, result, text, snapshot);
@@ -281,7 +274,7 @@ impl Server<'_> {
         snapshot: &Snapshot,
     ) {
         let connection = self.connections.iter_mut().find(|it| it.id == running.connection);
-        let line = answer(result, &running.request, snapshot, text);
+        let line = snapshot.answer(result, &running.request, snapshot.diagnostic(), text);
         let progress = running.unanswered.as_ref().and_then(|request| request.progress(line));
         if let Some((connection, line)) = connection.zip(progress) {
             // A client that has left is noticed in the next round.
@@ -300,7 +293,7 @@ impl Server<'_> {
         let Some(request) = running.unanswered.take() else { return };
         match self.connections.iter_mut().find(|it| it.id == running.connection) {
             Some(connection) => {
-                let answer = answer(result, &running.request, snapshot, text);
+                let answer = snapshot.answer(result, &running.request, snapshot.diagnostic(), text);
                 connection.waits_for_motion = false;
                 connection.peer.log_failure(&answer);
                 connection.answer(request, answer);
@@ -317,7 +310,8 @@ impl Server<'_> {
         let mut is_read = true;
         let mut supersede = |it: &mut Running| {
             if let Some(request) = it.unanswered.take() {
-                let superseded = answer(RequestResult::Superseded, &it.request, snapshot, REPLACED.into());
+                let superseded =
+                    snapshot.answer(RequestResult::Superseded, &it.request, snapshot.diagnostic(), REPLACED);
                 is_read &= connection.answer(request, superseded);
             }
         };
@@ -330,14 +324,8 @@ impl Server<'_> {
             if engagement.is_some() || !running.has_begun {
                 running.end(End::AtOnce);
             }
-            engagement.into_iter().for_each(|engagement| engagement.cancel(self.word));
+            engagement.into_iter().for_each(|engagement| engagement.cancel(self.links.word));
         }
         is_read
     }
-}
-
-fn answer(result: RequestResult, request: &str, snapshot: &Snapshot, text: String) -> AnswerLine {
-    let state = snapshot.status.state().unwrap_or_default();
-    let diagnostic = snapshot.status.diagnostic.diagnostic().unwrap_or_default();
-    answer_line(result, request, state, &diagnostic, text)
 }

@@ -4,11 +4,10 @@
 use std::fs::File;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
 
-use super::answer::answer_line;
 use crate::recorder::WindowOrder;
+use crate::snapshot::Snapshot;
 use hexad_client::operator::protocol::{AnswerLine, RequestResult};
-use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
 
 /// Name of the request.
 pub const RECORD: &str = "record";
@@ -45,7 +44,7 @@ impl PendingFile {
     }
 
     /// The answer, once the file is written.
-    pub fn answer(&self, state: State) -> Option<AnswerLine> {
+    pub fn answer(&self, snapshot: &Snapshot) -> Option<AnswerLine> {
         let (result, text) = match self.written.try_recv() {
             Ok(Ok(text)) => (RequestResult::Done, text),
             Ok(Err(why)) => (RequestResult::Failed, why),
@@ -54,7 +53,7 @@ impl PendingFile {
                 (RequestResult::Failed, DiagnosticCode::DaemonEnding.name().into())
             }
         };
-        Some(answer_line(result, self.request, state, &Diagnostic::default(), text))
+        Some(snapshot.answer(result, self.request, DiagnosticCode::None, text))
     }
 }
 
@@ -72,13 +71,13 @@ mod tests {
         let file = || Some(tempfile::tempfile().unwrap());
         let ordered = PendingFile::last_seconds(&windows, file(), Some(2.0)).unwrap();
         assert!(refused(file()).starts_with("the recorder has other recordings to write"));
-        assert_eq!(ordered.answer(State::Off), None);
+        assert_eq!(ordered.answer(&Snapshot::default()), None);
         let order: WindowOrder = orders.recv().unwrap();
         assert_eq!(order.last_s, 2.0);
         order.answer.send(Ok("7 cycles".into())).unwrap();
-        let answer = ordered.answer(State::Off).unwrap();
+        let answer = ordered.answer(&Snapshot::default()).unwrap();
         assert_eq!((answer.result, answer.text.as_str()), (RequestResult::Done, "7 cycles"));
         drop(order);
-        assert_eq!(ordered.answer(State::Off).unwrap().result, RequestResult::Failed);
+        assert_eq!(ordered.answer(&Snapshot::default()).unwrap().result, RequestResult::Failed);
     }
 }

@@ -9,9 +9,8 @@ use super::connection::Connection;
 use super::order::{Order, PendingOrder, stop_count};
 use super::pending_file::{PendingFile, RECORD};
 use super::reload::RELOAD;
-use super::ride::{PendingRide, answer_to_ride};
+use super::ride::PendingRide;
 use super::{MAX_WITHIN_S, Server};
-use crate::control_socket::answer::answer_line;
 use crate::leg_confirmation::{IN_ORDER, geometry_sha1};
 use crate::motion_requests::order::MotionOrder;
 use crate::process_names::{is_stopped, named, sentence};
@@ -62,7 +61,7 @@ impl Server<'_> {
                 CONFIRM_LEGS => self.confirm_legs(connection, request, line, snapshot),
                 name if MotionOrder::is_named(name) => self.begin_motion(connection, request, line, snapshot),
                 other => {
-                    if let Some(order) = RideOrder::ALL.into_iter().find(|it| it.name() == other) {
+                    if let Some(order) = RideOrder::by_name(other) {
                         return self.begin_ride(connection, request, line, order, snapshot);
                     }
                     let names = Request::ALL.map(Request::name).join(", ");
@@ -88,7 +87,7 @@ impl Server<'_> {
         line: &RequestLine,
         snapshot: &Snapshot,
     ) -> bool {
-        let stops_before = stop_count(self.word, of_controller);
+        let stops_before = stop_count(self.links.word, of_controller);
         let refusal = if of_controller.can_begin_control() { self.refusal(line, snapshot) } else { None };
         let refusal = refusal.or_else(|| self.refused_pose(line, snapshot));
         let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
@@ -102,8 +101,8 @@ impl Server<'_> {
             cycle_ns: line.cycle_ns.filter(|_| self.is_simulated()),
         };
         // What is answered takes no control any more.
-        let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.word));
-        let post = || PendingOrder::post(order, snapshot, self.word, (self.clock)());
+        let replaced = connection.pending.take().inspect(|(_, replaced)| replaced.cancel(self.links.word));
+        let post = || PendingOrder::post(order, snapshot, self.links.word, (self.clock)());
         let pending = refusal.is_none().then(post);
         let is_read = replaced.is_none_or(|(it, order)| connection.answer(it, order.superseded(snapshot)));
         let is_read = self.supersede_motion(connection, snapshot) && is_read;
@@ -120,12 +119,11 @@ impl Server<'_> {
         let number = line.pose?;
         let is_here = line.remote.is_none() && line.request == Request::Engage.name();
         let chosen = match is_here {
-            true => self.gate.choose(number as usize, snapshot.measurement.as_ref()),
+            true => self.links.gate.choose(number as usize, snapshot.measurement.as_ref()),
             false => Err("only engage selects a pose, and only from this host".into()),
         };
-        let (state, code) = (snapshot.status.state().unwrap_or_default(), DiagnosticCode::OtherPoses);
-        let refused = |text| answer_line(RequestResult::Refused, &line.request, state, &code.into(), text);
-        chosen.err().map(refused)
+        let code = DiagnosticCode::OtherPoses;
+        chosen.err().map(|text| snapshot.answer(RequestResult::Refused, &line.request, code, text))
     }
 
     /// Passes a recording to the recorder. False if the client has left.
@@ -134,7 +132,7 @@ impl Server<'_> {
         if connection.pending_file.is_some() {
             return connection.answer(request, AnswerLine::invalid(FILE_IN_PROGRESS.into()));
         }
-        match PendingFile::last_seconds(&self.windows, connection.file.take(), line.last_s) {
+        match PendingFile::last_seconds(&self.links.windows, connection.file.take(), line.last_s) {
             Ok(ordered) => connection.pending_file.replace((request, ordered)).is_none(),
             Err(reason) => connection.answer(request, AnswerLine::invalid(reason)),
         }
@@ -150,22 +148,22 @@ impl Server<'_> {
         snapshot: &Snapshot,
     ) -> bool {
         connection.peer.log_request(line);
-        let refused = |reason| answer_to_ride(RequestResult::Refused, order, snapshot, reason);
+        let answer = |result, text: &str| snapshot.answer(result, order.name(), DiagnosticCode::None, text);
+        let refused = |reason: &str| answer(RequestResult::Refused, reason);
         let (rider, stops) = (self.status.rider(self.woke_ns), self.stops());
         let ride = PendingRide::new(order, line, rider, stops, snapshot, self.woke_ns);
         let refusal = self.refusal(line, snapshot).or_else(|| {
-            let other = || refused("an order of this connection is in progress".into());
+            let other = || refused("an order of this connection is in progress");
             connection.ride.as_ref().map(|_| other())
         });
         match (refusal, ride) {
             (None, Ok(ride)) => {
-                let accepted = answer_to_ride(RequestResult::Accepted, order, snapshot, "accepted".into());
-                let accepted = request.progress(accepted);
+                let accepted = request.progress(answer(RequestResult::Accepted, "accepted"));
                 connection.ride = Some((request, ride));
                 accepted.is_none_or(|line| connection.send(&line))
             }
             (refusal, ride) => {
-                let answer = refusal.unwrap_or_else(|| refused(ride.err().unwrap_or_default()));
+                let answer = refusal.unwrap_or_else(|| refused(&ride.err().unwrap_or_default()));
                 connection.peer.log_failure(&answer);
                 connection.answer(request, answer)
             }
@@ -175,7 +173,7 @@ impl Server<'_> {
     /// Answers the orders for rides that have ended, and shows the others to their sources. An order ends when its client leaves, also
     /// one that left before the order was read.
     pub(super) fn advance_rides(&mut self) {
-        let (snapshot, now_ns, stops) = (*self.snapshots.read(), self.woke_ns, self.stops());
+        let (snapshot, now_ns, stops) = (*self.links.snapshots.read(), self.woke_ns, self.stops());
         let rider = self.status.rider(now_ns);
         let status = &mut self.status;
         let mut orders = vec![];
@@ -207,10 +205,7 @@ impl Server<'_> {
     ) -> bool {
         connection.peer.log_request(line);
         let config = &self.status.loaded().config;
-        let state = snapshot.status.state().unwrap_or_default();
-        let named = |result, text| {
-            answer_line(result, CONFIRM_LEGS, state, &DiagnosticCode::None.into(), String::from(text))
-        };
+        let named = |result, text: &str| snapshot.answer(result, CONFIRM_LEGS, DiagnosticCode::None, text);
         let answer = match (line.legs, &self.status.legs) {
             _ if line.remote.is_some() => {
                 named(RequestResult::Refused, "legs are confirmed on this host, where they are seen")
@@ -239,17 +234,16 @@ impl Server<'_> {
 
     /// The number of stops so far.
     pub(super) fn stops(&self) -> StopNumber {
-        StopNumber { daemon: self.began_us, count: stop_count(self.word, Request::Engage) }
+        StopNumber { daemon: self.began_us, count: stop_count(self.links.word, Request::Engage) }
     }
 
     /// Answer to a request that would begin control or motion, if the daemon ends, if the request may be old, or if a stop came after
     /// it was asked for.
     pub(super) fn refusal(&mut self, line: &RequestLine, snapshot: &Snapshot) -> Option<AnswerLine> {
-        let state = snapshot.status.state().unwrap_or_default();
         let answer = |result, code: DiagnosticCode, text: &str| {
-            Some(answer_line(result, &line.request, state, &code.into(), text.into()))
+            Some(snapshot.answer(result, &line.request, code, text))
         };
-        if self.is_ending.load(Ordering::Relaxed) {
+        if self.links.is_ending.load(Ordering::Relaxed) {
             let code = DiagnosticCode::DaemonEnding;
             return answer(RequestResult::Refused, code, code.name());
         }
@@ -262,7 +256,7 @@ impl Server<'_> {
             let [used, ignored] = if is_second { [other, one] } else { [one, other] };
             let two = Diagnostic::new(DiagnosticCode::TwoMeasuredSources, used.into(), ignored.into());
             let text = sentence(&two);
-            return Some(answer_line(RequestResult::Refused, &line.request, state, &two, text));
+            return Some(snapshot.answer(RequestResult::Refused, &line.request, two, text));
         }
         let mut drivers = self.status.drivers().into_iter().filter(|_| !line.until_ready);
         if let Some(stopped) = drivers.find(|driver| is_stopped(*driver)) {

@@ -1,12 +1,11 @@
 //! Orders for a ride, which the source of setpoints reads in its answers to `status`.
 
-use super::answer::answer_line;
 use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
 use hexad_client::operator::ride::{RideOrder, RidePhase, RideVerdict};
 use hexad_client::operator::status_report::StopNumber;
-use hexad_core::control::signals::diagnostic::Diagnostic;
+use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::state::State;
 
 /// Longest time for which an order for a ride is valid \[s\]. Nobody remembers an older one.
@@ -61,7 +60,8 @@ impl PendingRide {
         snapshot: &Snapshot,
         now_ns: u64,
     ) -> Option<AnswerLine> {
-        let ended = |result, text: &str| Some(answer_to_ride(result, self.order, snapshot, text.into()));
+        let ended =
+            |result, text: &str| Some(snapshot.answer(result, self.order.name(), DiagnosticCode::None, text));
         if self.stops != stops {
             return ended(RequestResult::Superseded, STOPPED);
         }
@@ -85,20 +85,8 @@ impl PendingRide {
 
 /// Why nobody rides; `None` under control.
 fn control_text(snapshot: &Snapshot) -> Option<String> {
-    let diagnostic = snapshot.status.diagnostic.diagnostic().unwrap_or_default();
-    let state = snapshot.status.state().unwrap_or_default();
+    let (state, diagnostic) = (snapshot.state(), snapshot.diagnostic());
     let text =
         || format!("the platform is not under control (state {}: {})", state.name(), sentence(&diagnostic));
     (state != State::Active).then(text)
-}
-
-/// Answer about a ride.
-pub fn answer_to_ride(
-    result: RequestResult,
-    order: RideOrder,
-    snapshot: &Snapshot,
-    text: String,
-) -> AnswerLine {
-    let state = snapshot.status.state().unwrap_or_default();
-    answer_line(result, order.name(), state, &Diagnostic::default(), text)
 }

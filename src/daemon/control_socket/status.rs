@@ -6,7 +6,6 @@ use std::os::unix::fs::MetadataExt;
 use std::process;
 use std::sync::Arc;
 
-use crate::control_socket::answer::diagnostic_report;
 use crate::leg_confirmation::LegConfirmation;
 use crate::process_names::{command, is_stopped, sentence};
 use crate::recorder::interruption::Interruption;
@@ -15,7 +14,7 @@ use crate::snapshot::Snapshot;
 use crate::version::VERSION as BUILD;
 use hexad_client::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
 use hexad_client::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
-use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, VERSION};
+use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult};
 use hexad_client::operator::ride::{RideOrder, RidePhase};
 use hexad_client::operator::status_report::{
     ConfigurationReport, LegReport, ProcessReport, SourceReport, StatusReport, StopNumber, TimingReport,
@@ -24,6 +23,7 @@ use hexad_client::operator::users::user_name;
 use hexad_core::control::signals::inputs::{Publishers, SetpointKind};
 use hexad_core::control::signals::limits::{Limit, LimitSet};
 use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::LEGS;
 use hexad_machine::config::Config;
 use hexad_machine::text::excerpt::excerpt_of_length;
@@ -162,19 +162,9 @@ impl StatusSource {
 
     /// Answer to a request for the status.
     pub fn answer(&mut self, snapshot: &Snapshot, now_ns: u64) -> AnswerLine {
-        let state = snapshot.status.state().unwrap_or_default();
-        let diagnostic = snapshot.status.diagnostic.diagnostic().unwrap_or_default();
-        let report = self.report(snapshot, now_ns);
-        AnswerLine {
-            version: VERSION,
-            result: RequestResult::Done,
-            request: "status".into(),
-            id: None,
-            state: state.name().into(),
-            text: sentence(&diagnostic),
-            diagnostic: diagnostic_report(&diagnostic),
-            status: Some(Box::new(report)),
-        }
+        let diagnostic = snapshot.diagnostic();
+        let answer = snapshot.answer(RequestResult::Done, "status", diagnostic, sentence(&diagnostic));
+        AnswerLine { status: Some(Box::new(self.report(snapshot, now_ns))), ..answer }
     }
 
     fn report(&mut self, snapshot: &Snapshot, now_ns: u64) -> StatusReport {
@@ -201,8 +191,8 @@ impl StatusSource {
                 loaded_unix_s: loaded.loaded_unix_s,
                 reloads: self.reloads,
             },
-            age_s: (snapshot.time_ns > 0).then(|| seconds(snapshot.time_ns, now_ns)),
-            limits_scale: Some(deployment.limits.scale),
+            age_s: (snapshot.time_ns > 0).then(|| seconds_since(snapshot.time_ns, now_ns)),
+            limits_scale: deployment.limits.scale,
             active_limits: limits.map(|limit| limit.name().into()).collect(),
             timing: timing(snapshot, deployment.realtime.rate_hz),
             pose: is_known.then_some(status.x),
@@ -210,7 +200,7 @@ impl StatusSource {
             target: setpoint
                 .filter(|setpoint| setpoint.kind == SetpointKind::Target && follows)
                 .map(|setpoint| setpoint.task.x.into()),
-            in_position: Some(status.in_position == 1),
+            in_position: status.in_position == 1,
             setpoint_distance: status
                 .setpoint_error()
                 .map(|error| [error.linear.norm(), error.angular.norm()])
@@ -246,7 +236,7 @@ impl StatusSource {
                       processes: Option<Vec<u32>>,
                       rejection: Option<Rejection>| SourceReport {
             topic: topic.into(),
-            age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
+            age_s: time_ns.map(|time_ns| seconds_since(time_ns, now_ns)),
             processes: processes
                 .into_iter()
                 .flatten()
@@ -273,10 +263,6 @@ impl StatusSource {
     }
 }
 
-fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
-}
-
 fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
     let (counters, window) = (&snapshot.status.counters, &snapshot.window);
     TimingReport {
@@ -293,7 +279,7 @@ fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
 /// The legs. Rates that are older than the timeout are of the past, as of a driver that has ended in motion.
 fn legs(snapshot: &Snapshot, now_ns: u64, timeout_s: f64) -> Vec<LegReport> {
     let Some(measurement) = &snapshot.measurement else { return vec![] };
-    let is_new = snapshot.status.pose_valid == 1 || seconds(measurement.time_ns, now_ns) < timeout_s;
+    let is_new = snapshot.status.pose_valid == 1 || seconds_since(measurement.time_ns, now_ns) < timeout_s;
     let rates = measurement.rate.filter(|_| is_new).map_or([None; LEGS], |rate| rate.map(Some));
     let numbers = measurement.length.iter().zip(rates).zip(&snapshot.force).take(LEGS);
     numbers

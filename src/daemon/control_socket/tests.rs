@@ -172,7 +172,7 @@ impl World {
             6 => self.advance_motion(),
             7 if self.below(4) == 0 => {
                 let request = if self.below(2) == 0 { Request::Stop } else { Request::Estop };
-                let _ = self.server.word.post(request as u32, NOW_NS.get());
+                let _ = self.server.links.word.post(request as u32, NOW_NS.get());
             }
             8 if self.below(8) == 0 => self.lose_client(),
             9 if self.below(16) == 0 => self.begin_anew(),
@@ -213,7 +213,7 @@ impl World {
     fn send_due(&mut self) {
         for client in &mut self.clients {
             for (_, line, asked) in client.later.extract_if(.., |(due, ..)| *due <= self.step) {
-                let text = serde_json::to_string(&line).unwrap() + "\n";
+                let text = line.to_line().unwrap();
                 client.stream.write_all(text.as_bytes()).unwrap();
                 let kind = KINDS.into_iter().find(|kind| *kind == line.request).unwrap();
                 let (asked, waits) = (line.stops.map(|_| asked), line.wait);
@@ -234,7 +234,7 @@ impl World {
     fn begin_anew(&mut self) {
         self.server.connections.clear();
         (self.server.motions.running, self.server.motions.next, self.job) = (None, None, None);
-        self.server.word = Box::leak(Box::default());
+        self.server.links.word = Box::leak(Box::default());
         self.server.began_us += 1;
         (self.state, self.wants_control) = (State::Off, false);
         self.snapshot = Snapshot::default();
@@ -249,12 +249,12 @@ impl World {
 
     /// The loop: as the controller answers, as far as the order of requests matters.
     fn cycle(&mut self) {
-        let word = self.server.word.load();
+        let word = self.server.links.word.load();
         let request = Request::from_number(number(word)).filter(|_| word != self.snapshot.answered);
         if let Some(request) = request {
             let refusal = self.obey(request);
             (self.snapshot.answered, self.snapshot.refusal) = (word, refusal.into());
-            self.server.word.set_seen(word);
+            self.server.links.word.set_seen(word);
         } else {
             self.state = match self.state {
                 State::Engaging => State::Active,

@@ -53,7 +53,7 @@ impl Inputs {
         self.cycle.input.measured_publishers = self.measured.publishers();
         if let Some(message) = &measured {
             self.cycle.input.measurement = Some(message.into());
-            self.cycle.measurements = self.measured.received_count();
+            self.cycle.measurements = self.measured.subscriber().received_count();
         }
         measured.is_some()
     }
@@ -74,7 +74,8 @@ impl Inputs {
     /// Whether the setpoint of an instant has arrived, or none can arrive because the source has left.
     pub fn has_setpoint_of(&mut self, time_ns: u64, has_control: bool) -> bool {
         // In this order, because the source sends its last message before it leaves.
-        let has_left = self.setpoints.received_count() > 0 && self.setpoints.publisher_count() == 0;
+        let has_left = self.setpoints.subscriber().received_count() > 0
+            && self.setpoints.subscriber().publisher_count() == 0;
         self.receive_setpoint(has_control);
         has_left || self.cycle.input.setpoint.is_some_and(|setpoint| setpoint.time_ns == time_ns)
     }
@@ -88,11 +89,11 @@ impl Inputs {
 
     /// The last reasons for rejecting a setpoint and a measurement, if the sender must correct them.
     pub fn last_rejections(&self) -> [Option<Rejection>; 2] {
-        [self.setpoints.last_rejection(), self.measured.last_rejection()]
+        [self.setpoints.subscriber().last_rejection(), self.measured.subscriber().last_rejection()]
     }
 
     /// Numbers of rejected messages on all topics.
     pub fn rejections(&self) -> RejectionCounts {
-        self.setpoints.rejections() + self.measured.rejections()
+        self.setpoints.subscriber().rejections() + self.measured.subscriber().rejections()
     }
 }

@@ -130,7 +130,7 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     }
     io.publish();
     IoReport {
-        send_failures: io.outputs.send_failures(),
+        send_failures: io.outputs.send_failures,
         rejected: io.inputs.rejections(),
         usage: ThreadUsage::of_this_thread().since(&at_start),
     }

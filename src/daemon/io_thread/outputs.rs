@@ -21,7 +21,8 @@ pub struct Outputs {
     statistics: Publisher<StatisticsMessage>,
     in_position: InPosition,
     is_simulated: bool,
-    send_failures: u64,
+    /// Number of messages that could not be sent.
+    pub send_failures: u64,
 }
 
 /// Settings for the messages, besides the output of the cycle.
@@ -76,11 +77,6 @@ impl Outputs {
     pub fn publish_statistics(&mut self, statistics: StatisticsMessage, release_ns: u64) {
         let time_ns = if self.is_simulated { release_ns } else { monotonic_ns() };
         self.send_failures += u64::from(self.statistics.publish(time_ns, statistics).is_err());
-    }
-
-    /// Number of messages that could not be sent.
-    pub fn send_failures(&self) -> u64 {
-        self.send_failures
     }
 
     fn publish_force(&mut self, cycle: &CycleOutput, time_ns: u64, delays: &mut Producer<'_, u64>) {

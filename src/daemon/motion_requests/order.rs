@@ -126,7 +126,7 @@ fn rates(given: Option<RateFields>, limits: &Limits) -> Result<[f64; 6], String>
 
 fn coordinates(line: &RequestLine, config: &Config) -> Result<Coordinates, String> {
     let name = line.rotation.as_deref().unwrap_or(RotationOrder::Xyz.name());
-    let order = RotationOrder::ALL.into_iter().find(|order| order.name() == name).ok_or_else(|| {
+    let order = RotationOrder::by_name(name).ok_or_else(|| {
         let names = RotationOrder::ALL.map(RotationOrder::name).join(", ");
         format!("rotation = {name:?}: must be one of {names}")
     })?;

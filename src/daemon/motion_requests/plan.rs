@@ -2,7 +2,7 @@
 
 use super::order::GotoOrder;
 use super::tool_stream::ToolStream;
-use crate::target_source::{Observation, TargetError, is_reached, reachable_target};
+use crate::target_source::{Observation, TargetError, is_reached, reachable_target, reason};
 use hexad_core::control::constants::Constants;
 use hexad_core::control::supervision::in_position::InPositionWindow;
 use hexad_core::model::task::pose_of;
@@ -39,7 +39,7 @@ impl GotoPlan {
         seen: &Observation,
         go_on: impl Fn() -> bool,
     ) -> Result<Self, TargetError> {
-        let x = seen.reference.ok_or_else(|| TargetError::UnknownPose(seen.text.as_str().into()))?;
+        let x = seen.reference.ok_or_else(|| TargetError::UnknownPose(reason(&seen.text)))?;
         let held = reachable_target(constants, seen).unwrap_or(x);
         let from = if is_reached(&x, &held) { held } else { x };
         let base = if order.home { config.machine.home } else { held };

@@ -28,13 +28,13 @@ pub struct Continuous {
     ended_bytes: u64,
     stream: Option<Stream>,
     /// The first cycle that may be missing on disk: the first of a second, or of a file.
-    unsaved_cycle: u64,
+    pub unsaved_cycle: u64,
     /// Whether the disk has recently accepted no data.
     interruption: Arc<Interruption>,
     /// No attempt is made before this cycle.
     retry_cycle: u64,
     /// Cycles that were not on disk when memory had no more room for them, or when the run ended.
-    unwritten: u64,
+    pub unwritten: u64,
     /// Unwritten cycles before this cycle are counted.
     counted_cycle: u64,
 }
@@ -57,12 +57,7 @@ impl Continuous {
 
     /// Bytes written, at most.
     pub fn bytes(&self) -> u64 {
-        self.ended_bytes + self.stream.as_ref().map_or(0, |stream| stream.file().bytes())
-    }
-
-    /// Cycles that were not written in time.
-    pub fn unwritten(&self) -> u64 {
-        self.unwritten
+        self.ended_bytes + self.stream.as_ref().map_or(0, |stream| stream.file.bytes())
     }
 
     /// Writes the new cycles of the tape.
@@ -76,11 +71,6 @@ impl Continuous {
         }
     }
 
-    /// Begins another file with a cycle. Earlier cycles are dropped.
-    pub fn begin_at(&mut self, cycle: u64) {
-        self.unsaved_cycle = cycle;
-    }
-
     /// Completes the last file.
     pub fn finish(&mut self, context: &Context, tape: &Tape) {
         self.retry_cycle = 0;
@@ -90,9 +80,9 @@ impl Continuous {
             warn!(lost, "the recording ends with cycles that are not on disk");
         }
         let Some(stream) = self.stream.take() else { return };
-        self.ended_bytes += stream.file().bytes();
-        let path = stream.file().path().to_path_buf();
-        match stream.finish() {
+        self.ended_bytes += stream.file.bytes();
+        let path = stream.file.path().to_path_buf();
+        match stream.file.finish() {
             Ok(path) => info!("the recording is in {}", path.display()),
             Err(error) if remove_if_empty(&path) => warn!("the last part of the recording is lost: {error}"),
             Err(error) => warn!("the recording is not complete: {error}; `hexad recover` completes it"),
@@ -103,7 +93,7 @@ impl Continuous {
         if self.interruption.is_ongoing() && self.stream.is_none() {
             self.count_unwritten(tape.oldest());
         }
-        let next_cycle = self.stream.as_ref().map_or(self.unsaved_cycle, Stream::next_cycle);
+        let next_cycle = self.stream.as_ref().map_or(self.unsaved_cycle, |stream| stream.next_cycle);
         for cycle in tape.from(next_cycle) {
             if context.begins_second(cycle.cycle) {
                 self.end_second(cycle)?;
@@ -133,16 +123,16 @@ impl Continuous {
     /// Marks everything before the cycle as saved, and ends a full file.
     fn end_second(&mut self, cycle: &CycleMessage) -> Result<(), RecordingError> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
-        stream.flush()?;
+        stream.file.flush()?;
         self.unsaved_cycle = cycle.cycle;
         if self.interruption.is_ongoing() {
-            let (path, unwritten) = (stream.file().path().display(), self.unwritten);
+            let (path, unwritten) = (stream.file.path().display(), self.unwritten);
             let lasted_s = self.interruption.end();
             info!(unwritten, "the recording goes on in {path}: for {lasted_s:.0} s nothing was written");
         }
-        if let Some(full) = self.stream.take_if(|stream| stream.file().bytes() >= self.folder.file_bytes()) {
-            self.ended_bytes += full.file().bytes();
-            full.finish()?;
+        if let Some(full) = self.stream.take_if(|stream| stream.file.bytes() >= self.folder.file_bytes()) {
+            self.ended_bytes += full.file.bytes();
+            full.file.finish()?;
         }
         Ok(())
     }
@@ -161,8 +151,8 @@ impl Continuous {
 
     fn interrupt(&mut self, error: &RecordingError) {
         if let Some(stream) = self.stream.take() {
-            let (path, bytes) = (stream.file().path().to_path_buf(), stream.file().bytes());
-            let is_saved = stream.first_cycle() < self.unsaved_cycle;
+            let (path, bytes) = (stream.file.path().to_path_buf(), stream.file.bytes());
+            let is_saved = stream.first_cycle < self.unsaved_cycle;
             drop(stream);
             if is_saved {
                 self.ended_bytes += bytes;

@@ -77,7 +77,6 @@ pub struct RecorderReport {
     /// Cycles lost because a queue was full.
     pub missing: u64,
     /// Cycles that were not on disk when memory had no more room for them, or when the run ended.
-    #[serde(default)]
     pub unwritten: u64,
     /// Upper bound of the bytes written.
     pub bytes: u64,
@@ -183,11 +182,11 @@ impl<'a> Recorder<'a> {
             }
         }
         self.windows.finish(&self.context, &self.tape);
-        let (mut bytes, mut unwritten) = (self.windows.bytes(), 0);
+        let (mut bytes, mut unwritten) = (self.windows.bytes, 0);
         if let Some(recording) = &mut self.recording {
             recording.finish(&self.context, &self.tape);
             bytes += recording.bytes();
-            unwritten = recording.unwritten();
+            unwritten = recording.unwritten;
         }
         let usage = ThreadUsage::of_this_thread().since(&at_start);
         RecorderReport {
@@ -214,7 +213,7 @@ impl<'a> Recorder<'a> {
     fn add(&mut self, cycle: &CycleMessage) {
         self.report.missing += self.replica.skip_to(cycle.cycle);
         self.report.cycles += 1;
-        let is_resumed = !self.replica.is_in_step() && self.resume(cycle.cycle);
+        let is_resumed = !self.replica.is_in_step && self.resume(cycle.cycle);
         let is_kept = is_resumed || self.tape.is_empty() || self.context.begins_second(cycle.cycle);
         self.tape.push(cycle, self.replica.memory().filter(|_| is_kept));
         self.replica.step(cycle);
@@ -227,7 +226,8 @@ impl<'a> Recorder<'a> {
         self.windows.finish(&self.context, &self.tape);
         if let Some(recording) = &mut self.recording {
             recording.finish(&self.context, &self.tape);
-            recording.begin_at(self.replica.next_cycle());
+            // Earlier cycles are dropped.
+            recording.unsaved_cycle = self.replica.next_cycle;
         }
         let RunInfo { clock_offset_ns, .. } = self.context.info;
         self.context.info = RunInfo { clock_offset_ns, ..info(loaded) };

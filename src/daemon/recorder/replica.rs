@@ -9,8 +9,9 @@ use hexad_core::control::controller::{Controller, Memory};
 /// Repeats the cycles of the real-time thread. After a missing cycle it resumes from a memory of that thread.
 pub struct Replica {
     controller: Controller,
-    next_cycle: u64,
-    is_in_step: bool,
+    pub next_cycle: u64,
+    /// Whether its memory equals the real-time thread's before the next cycle.
+    pub is_in_step: bool,
     /// Number of cycles not repeated to the bit.
     unrepeated: u64,
 }
@@ -24,16 +25,6 @@ impl Replica {
     /// Exchanges the constants, as the real-time thread does.
     pub fn reconfigure(&mut self, mut new: Controller) {
         self.controller.exchange_configuration(&mut new);
-    }
-
-    /// Number of the next cycle.
-    pub fn next_cycle(&self) -> u64 {
-        self.next_cycle
-    }
-
-    /// Whether its memory equals the real-time thread's before the next cycle.
-    pub fn is_in_step(&self) -> bool {
-        self.is_in_step
     }
 
     /// Whether it has repeated every cycle to the bit.

@@ -1,7 +1,5 @@
 //! Stream: a part of the tape that is being written to one file.
 
-use std::path::PathBuf;
-
 use super::Context;
 use super::tape::Tape;
 use crate::recording::file::RecordingFile;
@@ -13,30 +11,15 @@ const SCENES_PER_S: u64 = 100;
 
 /// Part of the tape that is being written to one file.
 pub struct Stream {
-    file: RecordingFile,
-    first_cycle: u64,
-    next_cycle: u64,
+    pub file: RecordingFile,
+    pub first_cycle: u64,
+    pub next_cycle: u64,
 }
 
 impl Stream {
     /// Begins a file with a cycle. If the first written cycle is later, the file begins with a gap.
     pub fn new(file: RecordingFile, first_cycle: u64) -> Self {
         Self { file, first_cycle, next_cycle: first_cycle }
-    }
-
-    /// The file.
-    pub fn file(&self) -> &RecordingFile {
-        &self.file
-    }
-
-    /// Number of the first cycle.
-    pub fn first_cycle(&self) -> u64 {
-        self.first_cycle
-    }
-
-    /// Number of the next cycle.
-    pub fn next_cycle(&self) -> u64 {
-        self.next_cycle
     }
 
     /// Writes a cycle with its memory, frames and joints.
@@ -60,15 +43,5 @@ impl Stream {
         }
         *next_cycle = cycle.cycle + 1;
         Ok(())
-    }
-
-    /// Writes the current chunk.
-    pub fn flush(&mut self) -> Result<(), RecordingError> {
-        self.file.flush()
-    }
-
-    /// Completes the file.
-    pub fn finish(self) -> Result<PathBuf, RecordingError> {
-        self.file.finish()
     }
 }

@@ -42,7 +42,8 @@ pub struct Windows {
     faults: u32,
     orders: Receiver<WindowOrder>,
     window: Option<Window>,
-    bytes: u64,
+    /// Upper bound of the bytes written.
+    pub bytes: u64,
 }
 
 /// Window that is being written.
@@ -58,11 +59,6 @@ impl Windows {
     /// Writer that puts fault windows into the folder.
     pub fn new(folder: Option<Folder>, rate: u64, orders: Receiver<WindowOrder>) -> Self {
         Self { folder, watch: FaultWatch::new(rate), faults: 0, orders, window: None, bytes: 0 }
-    }
-
-    /// Upper bound of the bytes written.
-    pub fn bytes(&self) -> u64 {
-        self.bytes
     }
 
     /// Whether a window is being written.
@@ -141,7 +137,7 @@ impl Windows {
 
     fn finish_window(&mut self) {
         let Some(window) = self.window.take() else { return };
-        self.bytes += window.stream.file().bytes();
+        self.bytes += window.stream.file.bytes();
         window.conclude(Ok(()));
     }
 }
@@ -160,19 +156,19 @@ impl Window {
     /// Writes some cycles. Returns whether the last one is written.
     fn advance(&mut self, context: &Context, tape: &Tape) -> Result<bool, RecordingError> {
         let last = self.last;
-        let cycles = tape.from(self.stream.next_cycle()).take_while(|cycle| cycle.cycle <= last);
+        let cycles = tape.from(self.stream.next_cycle).take_while(|cycle| cycle.cycle <= last);
         for cycle in cycles.take(CYCLES_PER_STEP) {
             self.stream.write(context, tape, cycle)?;
             self.cycles += 1;
         }
-        Ok(self.stream.next_cycle() > last)
+        Ok(self.stream.next_cycle > last)
     }
 
     /// Completes the file, and reports the result to the operator or the log.
     fn conclude(self, written: Result<(), RecordingError>) {
         let Self { stream, cycles, answer, .. } = self;
-        let path = stream.file().path().to_path_buf();
-        let result = written.and_then(|()| stream.finish());
+        let path = stream.file.path().to_path_buf();
+        let result = written.and_then(|()| stream.file.finish());
         match answer {
             // The receiver is gone if the client has left.
             Some(answer) => {

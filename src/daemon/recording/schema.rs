@@ -73,9 +73,9 @@ pub fn of_layout(layout: &'static Layout) -> (String, String) {
     let mut parts: Vec<&'static Layout> = vec![];
     nested(layout, &mut parts);
     for part in parts {
-        let _ = write!(text, "{SEPARATOR}\nMSG: hexad/{}\n{}", name(part), fields(part));
+        let _ = write!(text, "{SEPARATOR}\nMSG: hexad/{}\n{}", part.class(), fields(part));
     }
-    (format!("hexad/msg/{}", name(layout)), text)
+    (format!("hexad/msg/{}", layout.class()), text)
 }
 
 fn nested(layout: &'static Layout, found: &mut Vec<&'static Layout>) {
@@ -89,17 +89,6 @@ fn nested(layout: &'static Layout, found: &mut Vec<&'static Layout>) {
     }
 }
 
-/// `hexad_diagnostic_record` is `DiagnosticRecord`.
-fn name(layout: &Layout) -> String {
-    let words = layout.type_name.trim_start_matches("hexad_").split('_');
-    words
-        .flat_map(|word| {
-            let mut letters = word.chars();
-            letters.next().map(|first| first.to_ascii_uppercase()).into_iter().chain(letters)
-        })
-        .collect()
-}
-
 fn fields(layout: &Layout) -> String {
     let mut text = String::new();
     for Field { name: field, kind, count, unit, doc, .. } in layout.fields {
@@ -107,7 +96,7 @@ fn fields(layout: &Layout) -> String {
             Kind::U32 => "uint32".into(),
             Kind::U64 => "uint64".into(),
             Kind::F64 => "float64".into(),
-            Kind::Struct(part) => format!("hexad/{}", name(part)),
+            Kind::Struct(part) => format!("hexad/{}", part.class()),
         };
         let count = count.map_or_else(String::new, |count| format!("[{count}]"));
         let unit = if unit.is_empty() { String::new() } else { format!(" [{unit}]") };

@@ -46,16 +46,16 @@ pub enum TargetError {
     OtherSource(String),
     /// The platform does not stand under control.
     #[error("the platform is not under control (state {state}: {1}); engage takes control", state = .0.name())]
-    NotInControl(State, Reason),
+    NotInControl(State, String),
     /// No pose is measured.
     #[error("the pose of the platform is unknown: {0}")]
-    UnknownPose(Reason),
+    UnknownPose(String),
     /// The daemon has another setpoint.
     #[error("the daemon does not follow this target, but another setpoint: does another source run?")]
     NotFollowed,
     /// An operator or a fault has ended control.
     #[error("control has ended: the daemon is in {state}: {1}", state = .0.name())]
-    Ended(State, Reason),
+    Ended(State, String),
     /// The daemon does not answer.
     #[error("control has ended: {0}")]
     NoAnswer(String),
@@ -91,21 +91,9 @@ impl TargetError {
 }
 
 /// Reason of a refusal: what the daemon says of its state, and never an empty text.
-#[derive(Clone, Debug)]
-pub struct Reason(String);
-
-impl From<&str> for Reason {
-    fn from(text: &str) -> Self {
-        let without_fault =
-            "the daemon reports no fault: is the driver, or in simulated time a source, started?";
-        Self(if matches!(text, "" | "none") { without_fault } else { text }.into())
-    }
-}
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
+pub fn reason(text: &str) -> String {
+    let without_fault = "the daemon reports no fault: is the driver, or in simulated time a source, started?";
+    if matches!(text, "" | "none") { without_fault } else { text }.into()
 }
 
 /// Distance and angle, for people.
@@ -136,7 +124,7 @@ mod tests {
     #[test]
     fn a_refusal_always_has_a_reason() {
         for text in ["", "none", "no measurement"] {
-            let refusal = TargetError::UnknownPose(text.into()).to_string();
+            let refusal = TargetError::UnknownPose(reason(text)).to_string();
             assert!(refusal.ends_with("started?") || refusal.ends_with(": no measurement"), "{refusal}");
         }
     }

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-pub use self::error::{Deviation, TargetError};
+pub use self::error::{Deviation, TargetError, reason};
 pub use self::observation::Observation;
 use super::nanoseconds;
 use super::process_names::named;
@@ -20,6 +20,7 @@ use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad_core::control::signals::limits::DerivativeLimits;
 use hexad_core::control::signals::state::State;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::rigid::Twist;
 use hexad_core::model::task::{TaskState, pose_of, task_coordinates};
 use hexad_machine::analysis::target_motion::{REACHED_M, REACHED_RAD, check_target};
@@ -113,8 +114,8 @@ pub struct TargetSource<'a, F> {
     published: Option<([f64; 6], u64)>,
     /// Instant at which the source was opened \[ns\].
     began_ns: u64,
-    /// Share of the limits of autonomous motions.
-    speed: f64,
+    /// Share of the limits of autonomous motions with which the next targets are approached.
+    pub speed: f64,
 }
 
 impl<'a, F: Feed> TargetSource<'a, F> {
@@ -126,7 +127,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
         let (now, _) = feed.observe()?;
         let is_active = now.state == State::Active;
         if !is_active && !may_engage {
-            return Err(TargetError::NotInControl(now.state, now.text.as_str().into()));
+            return Err(TargetError::NotInControl(now.state, reason(&now.text)));
         }
         let mut setpoints: Publisher<SetpointMessage> = bus.publisher()?;
         setpoints.begin_epoch();
@@ -145,11 +146,6 @@ impl<'a, F: Feed> TargetSource<'a, F> {
         })
     }
 
-    /// Sets the share of the limits of autonomous motions with which the next targets are approached.
-    pub fn set_speed(&mut self, speed: f64) {
-        self.speed = speed;
-    }
-
     /// Instant since which the platform follows \[ns\].
     pub fn active_since_ns(&self) -> Option<u64> {
         self.active_since_ns
@@ -158,7 +154,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     /// X of the reference or of the platform now.
     pub fn present_x(&mut self) -> Result<[f64; 6], TargetError> {
         let (now, _) = self.feed.observe()?;
-        now.reference.ok_or_else(|| TargetError::UnknownPose(now.text.as_str().into()))
+        now.reference.ok_or_else(|| TargetError::UnknownPose(reason(&now.text)))
     }
 
     /// X at which the platform comes to rest if it brakes now with the limits of autonomous motions. The
@@ -166,16 +162,16 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     pub fn resting_x(&mut self, constants: &Constants) -> Result<[f64; 6], TargetError> {
         let (newest, before) = self.feed.observe()?;
         let of = |observation: &Observation| Some(pose_of(&observation.reference?));
-        let now = of(newest).ok_or_else(|| TargetError::UnknownPose(newest.text.as_str().into()))?;
+        let now = of(newest).ok_or_else(|| TargetError::UnknownPose(reason(&newest.text)))?;
         let earlier = before.and_then(|before| {
-            let interval_s = seconds(before.time_ns, newest.time_ns);
+            let interval_s = seconds_since(before.time_ns, newest.time_ns);
             Some((of(before)?, interval_s))
                 .filter(|_| interval_s > 0.0 && interval_s < MAX_INTERVAL_S && newest.state.has_control())
         });
         let Some((then, interval_s)) = earlier else { return self.present_x() };
         let moved = then.displacement_to(&now);
         let limits = &constants.parameters.limits;
-        let age_s = seconds(newest.time_ns, monotonic_ns());
+        let age_s = seconds_since(newest.time_ns, monotonic_ns());
         let ahead = |moved: Vector3<f64>, limits: &DerivativeLimits| {
             let DerivativeLimits { acceleration, jerk, .. } =
                 limits.scaled(constants.parameters.limits.autonomous_scale);
@@ -248,7 +244,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
             return Ok(());
         }
         if !now.state.follows() {
-            return Err(TargetError::Ended(now.state, now.text.as_str().into()));
+            return Err(TargetError::Ended(now.state, reason(&now.text)));
         }
         // An older observation has another setpoint.
         let is_late = monotonic_ns().saturating_sub(published_ns.max(since_ns)) > FOLLOWING_LIMIT_NS;
@@ -263,8 +259,4 @@ impl<'a, F: Feed> TargetSource<'a, F> {
 pub fn has_received(observation: &Observation, x: &[f64; 6]) -> bool {
     let is_same = |received: [f64; 6]| received.iter().zip(x).all(|(a, b)| (a - b).abs() < SAME);
     observation.setpoint.is_some_and(is_same)
-}
-
-fn seconds(from_ns: u64, to_ns: u64) -> f64 {
-    to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }

@@ -59,7 +59,7 @@ impl Observation {
         let error = report.orientation_error_rad.zip(report.position_error_m);
         let observation = Self {
             time_ns: requested_ns,
-            state: State::ALL.into_iter().find(|state| state.name() == answer.state).unwrap_or_default(),
+            state: State::by_name(&answer.state).unwrap_or_default(),
             code: answer.diagnostic.code,
             text: answer.text.clone(),
             setpoint: report.setpoint,

@@ -14,22 +14,14 @@ use hexad_core::motion::frames::Frames;
 /// Largest length of a frame's name.
 pub const MAX_FRAME_NAME_LENGTH: usize = 16;
 
-/// Where a frame is fixed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum FrameKind {
-    /// In the platform
-    Tool,
-    /// In the base
-    Work,
-}
-
-impl FrameKind {
-    /// Value of the key `kind`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tool => "tool",
-            Self::Work => "work",
-        }
+hexad_core::named! {
+    /// Where a frame is fixed.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+    pub enum FrameKind {
+        /// In the platform
+        Tool => "tool",
+        /// In the base
+        Work => "work",
     }
 }
 
@@ -99,7 +91,7 @@ pub(super) fn read(root: &mut SectionReader) -> Vec<NamedFrame> {
         if let Some(earlier) = frames.iter().position(|frame| frame.name == name && !name.is_empty()) {
             reader.reject("name", format!("must differ from the name of frame[{}]", earlier + 1));
         }
-        let options = [FrameKind::Tool, FrameKind::Work].map(|kind| (kind.name(), kind));
+        let options = FrameKind::ALL.map(|kind| (kind.name(), kind));
         let kind = reader.choice("kind", &options).unwrap_or(FrameKind::Tool);
         let x: [f64; 6] = reader.vector("pose");
         let [alpha, beta, gamma, ..] = x;
@@ -109,7 +101,6 @@ pub(super) fn read(root: &mut SectionReader) -> Vec<NamedFrame> {
                 "must have angles in [-2 pi, 2 pi]: alpha, beta, gamma [rad], then x, y, z [m]",
             );
         }
-        reader.finish();
         frames.push(NamedFrame { name, kind, x });
     }
     frames

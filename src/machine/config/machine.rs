@@ -81,8 +81,6 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
         machine.actuator.friction_uncertainty = usual_friction_uncertainty(&machine);
     }
     geometry::check(&machine, &legs, &home);
-    home.finish();
-    legs.into_iter().for_each(|leg| leg.reader.finish());
     machine
 }
 
@@ -92,12 +90,10 @@ fn platform(mut section: SectionReader) -> Platform {
     let mut tensor = section.section("inertia_kg_m2");
     let [xx, yy, zz] = ["xx", "yy", "zz"].map(|key| tensor.number(key, Bound::Positive));
     let [xy, xz, yz] = ["xy", "xz", "yz"].map(|key| tensor.number_or(key, 0.0, Bound::Finite));
-    tensor.finish();
     let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     if inertia.iter().all(|x| x.is_finite()) {
         check_inertia(&section, &inertia);
     }
-    section.finish();
     Platform { mass, center_of_mass, inertia }
 }
 
@@ -152,7 +148,6 @@ fn actuator(mut section: SectionReader) -> Actuator {
         );
         section.reject("min_length_m", bound);
     }
-    section.finish();
     actuator
 }
 
@@ -173,7 +168,6 @@ fn link(mut section: SectionReader, actuator: &Actuator) -> Link {
             format!("must be at least {} (half of axial_inertia_kg_m2)", rounded(bound)),
         );
     }
-    section.finish();
     link
 }
 
@@ -184,13 +178,11 @@ fn transverse_inertia(section: &mut SectionReader) -> TransverseInertia {
         return TransverseInertia { constant, quadratic: 0.0, reference_length: 0.0 };
     }
     let mut table = section.section(KEY);
-    let inertia = TransverseInertia {
+    TransverseInertia {
         constant: table.number("constant_kg_m2", Bound::Finite),
         quadratic: table.number("quadratic_kg", Bound::Finite),
         reference_length: table.number("reference_length_m", Bound::Finite),
-    };
-    table.finish();
-    inertia
+    }
 }
 
 /// Least transverse inertia of a link over the stroke; NaN if a value that it depends on was rejected.

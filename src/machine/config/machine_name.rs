@@ -12,7 +12,9 @@ pub fn name_in(path: &Path) -> Result<String, ConfigError> {
     let (text, place) = text::read_file(path)?;
     let (table, _) = DeTable::parse_recoverable(&text);
     let log = ViolationLog::new(&text, vec![]);
-    let name = SectionReader::root(&log, table.get_ref()).name("name", MAX_NAME_LENGTH);
+    let mut root = SectionReader::root(&log, table.get_ref());
+    let name = root.name("name", MAX_NAME_LENGTH);
+    root.ignore_others();
     let violations = log.into_violations();
     if violations.is_empty() { Ok(name) } else { Err(ConfigError::Invalid { place, violations }) }
 }

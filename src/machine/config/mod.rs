@@ -128,7 +128,7 @@ impl Config {
         let mut machine = machine::read(&mut root, level);
         let frames = frames::read(&mut root);
         let deployment = deployment::read(&mut root, &machine);
-        root.finish();
+        drop(root);
         if let Some(envelope) = &deployment.envelope {
             machine.max_rotation = machine.max_rotation.max(envelope.largest_rotation(&machine));
         }

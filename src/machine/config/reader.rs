@@ -95,6 +95,11 @@ impl<'t> SectionReader<'t> {
         found.map_or(default, |value| self.checked(self.key(key), value, bound))
     }
 
+    /// A number that has no bound by default.
+    pub fn bounded_number(&mut self, key: &'static str, bound: Bound) -> Option<f64> {
+        Some(self.number_or(key, f64::INFINITY, bound)).filter(|number| number.is_finite())
+    }
+
     /// A number for all legs, or an array with one per leg; with a default.
     pub fn per_leg_or(&mut self, key: &'static str, default: f64, bound: Bound) -> [f64; LEGS] {
         let Some(value) = self.find(key, Some(default.to_string())) else { return [default; LEGS] };
@@ -232,21 +237,9 @@ impl<'t> SectionReader<'t> {
         self.add(self.line, self.path.clone(), Some(value.into()), bound.into());
     }
 
-    /// Logs a violation for each unknown key. Call it after all known keys have been read.
-    pub fn finish(self) {
-        let known: Vec<&str> = self.known.iter().map(|(key, _)| *key).collect();
-        for (key, value) in self.table.into_iter().flatten() {
-            if !known.contains(&key.get_ref().as_ref()) {
-                let probable = nearest(key.get_ref(), &known).map(|name| format!(" probably {name},"));
-                let bound = format!(
-                    "unknown key,{} must be one of: {}",
-                    probable.unwrap_or_default(),
-                    known.join(", ")
-                );
-                let line = self.log.line(key.span().start);
-                self.add(line, self.key(&excerpt(key.get_ref())), self.log.shown(value), bound);
-            }
-        }
+    /// Ends the reader, whatever other keys the section has.
+    pub fn ignore_others(mut self) {
+        self.table = None;
     }
 
     fn children(&self, key: &str, rows: impl Iterator<Item = &'t Spanned<DeValue<'t>>>) -> Vec<Self> {
@@ -352,6 +345,25 @@ impl<'t> SectionReader<'t> {
 
     fn add(&self, line: usize, key: String, value: Option<String>, bound: String) {
         self.log.violations.borrow_mut().push(Violation { line, key, value, bound });
+    }
+}
+
+/// At its end a reader logs a violation for each key that it does not know.
+impl Drop for SectionReader<'_> {
+    fn drop(&mut self) {
+        let known: Vec<&str> = self.known.iter().map(|(key, _)| *key).collect();
+        for (key, value) in self.table.into_iter().flatten() {
+            if !known.contains(&key.get_ref().as_ref()) {
+                let probable = nearest(key.get_ref(), &known).map(|name| format!(" probably {name},"));
+                let bound = format!(
+                    "unknown key,{} must be one of: {}",
+                    probable.unwrap_or_default(),
+                    known.join(", ")
+                );
+                let line = self.log.line(key.span().start);
+                self.add(line, self.key(&excerpt(key.get_ref())), self.log.shown(value), bound);
+            }
+        }
     }
 }
 

@@ -39,7 +39,7 @@ pub(super) fn without_broken_lines(text: &str) -> (String, Vec<Violation>) {
 }
 
 /// Number of the line that contains byte `offset`, counting from 1.
-fn line_at(text: &str, offset: usize) -> usize {
+pub(super) fn line_at(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
 }
 

@@ -30,7 +30,8 @@ type Utf8<R> = Chain<Cursor<Vec<u8>>, R>;
 /// Reader of CSV text, row by row.
 pub struct CsvRows<R> {
     reader: Reader<Limited<Text<R>>>,
-    delimiter: u8,
+    /// What separates fields.
+    pub delimiter: u8,
     /// Bytes that the present row may still take.
     remaining: Rc<Cell<usize>>,
     record: ByteRecord,
@@ -66,11 +67,6 @@ impl<R: Read> CsvRows<R> {
             .comment(Some(COMMENT));
         let reader = builder.from_reader(source);
         Ok(Self { reader, delimiter, remaining, record: ByteRecord::new() })
-    }
-
-    /// What separates fields.
-    pub fn delimiter(&self) -> u8 {
-        self.delimiter
     }
 
     /// The next row that has a field that is not blank, with its line; or an error, after which there is no other row.

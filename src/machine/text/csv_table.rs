@@ -94,7 +94,7 @@ impl NumberTable {
         let names = |record: &csv::ByteRecord| record.iter().map(|name| cell(name).trim().into()).collect();
         let (line, header): (_, Vec<String>) =
             source.next_row()?.map_or((1, vec![]), |(line, record)| (line, names(record)));
-        let delimiter = char::from(source.delimiter()).to_string();
+        let delimiter = char::from(source.delimiter).to_string();
         let group =
             select_group(&header, required, group).map_err(|error| format!("line {line}: {error}"))?;
         let names = group.map_or_else(|| header.clone(), |group| without_group(&header, group));

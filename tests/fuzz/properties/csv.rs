@@ -5,7 +5,6 @@ use std::sync::LazyLock;
 
 use hexad::commands::forward_kinematics::{StartPose, forward_kinematics};
 use hexad::commands::inverse_dynamics::inverse_dynamics;
-use hexad::commands::r#move::SetpointError;
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::commands::orientation::OrientationFormat;
 use hexad::config::Config;
@@ -145,8 +144,7 @@ fn check_output(input: &NumberTable, output: &mut CsvWriter, width: usize) {
 /// table.
 fn check_trajectory(table: &NumberTable, input: &[u8]) {
     match Trajectory::from_rows(table, Path::new(PLACE)) {
-        Err(SetpointError::Table(error)) => check_refusal(&error, input),
-        Err(error) => panic!("bytes can be read: {error}"),
+        Err(error) => check_refusal(&error, input),
         Ok(trajectory) => {
             let duration = trajectory.duration();
             assert!(duration.is_finite() && duration >= 0.0, "{duration} s");

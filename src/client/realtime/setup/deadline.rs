@@ -13,6 +13,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
+use crate::realtime::process::handle_signal;
 
 /// Share of a period reserved for computing: many times the usual time of a cycle, and with half a period of spinning
 /// still below the 95 % that the kernel admits.
@@ -56,7 +57,9 @@ extern "C" fn count_exhausted(_: libc::c_int) {
 
 /// Puts the calling thread under SCHED_DEADLINE. It cannot start threads from then on.
 pub fn reserve(reservation: &Reservation) -> Result<(), Shortfall> {
-    count_exhaustions();
+    // Without a handler the signal would end the process. It cannot fail for this signal.
+    // SAFETY: the handler only adds to an atomic.
+    let _ = unsafe { handle_signal(libc::SIGXCPU, count_exhausted) };
     let Reservation { budget_ns, period_ns } = *reservation;
     let attributes = libc::sched_attr {
         size: size_of::<libc::sched_attr>() as u32,
@@ -73,17 +76,4 @@ pub fn reserve(reservation: &Reservation) -> Result<(), Shortfall> {
         return Ok(());
     }
     Err(refusals::of(&SetupStep::Deadline(*reservation)))
-}
-
-/// Counts SIGXCPU, the kernel's signal for an exhausted budget, which would otherwise end the process.
-fn count_exhaustions() {
-    // SAFETY: all-zero is a valid sigaction; then handler and flags are set. The handler only adds to an
-    // atomic, which is allowed in one. It cannot fail for this signal.
-    unsafe {
-        let mut action: libc::sigaction = core::mem::zeroed();
-        action.sa_sigaction = count_exhausted as extern "C" fn(libc::c_int) as libc::sighandler_t;
-        // An interrupted system call continues.
-        action.sa_flags = libc::SA_RESTART;
-        libc::sigaction(libc::SIGXCPU, &action, core::ptr::null_mut());
-    }
 }

@@ -6,6 +6,7 @@ use std::fs;
 use serde::Deserialize;
 
 use super::rejection::Rejection;
+use crate::commands::failure::Failure;
 use crate::commands::quantity::{angle, length};
 use hexad_core::model::rigid::Pose;
 use hexad_core::model::task::{TaskState, task_coordinates};
@@ -30,15 +31,6 @@ pub const MAX_BYTES: usize = 8192;
 
 /// Names of the numbers.
 const NAMES: [&str; 7] = ["stamp", "alpha", "beta", "gamma", "x", "y", "z"];
-
-/// Reasons of a format that is not usable.
-#[derive(Debug, thiserror::Error)]
-pub enum FormatError {
-    #[error("--format {0}: no such file; the formats with a name are x-plane, flypt-mover and simtools")]
-    Unknown(String),
-    #[error("--format {0}: {1}")]
-    Wrong(String, String),
-}
 
 /// Numbers of a datagram.
 #[derive(Clone, Debug, PartialEq)]
@@ -187,18 +179,22 @@ fn xyz() -> String {
 
 impl DatagramFormat {
     /// The format with this name, or of this file.
-    pub fn load(name: &str) -> Result<Self, FormatError> {
+    pub fn load(name: &str) -> Result<Self, Failure> {
         let known = KNOWN.into_iter().find(|(known, _)| *known == name);
         let text = match known {
             Some((_, text)) => text.into(),
-            None => fs::read_to_string(name).map_err(|_| FormatError::Unknown(name.into()))?,
+            None => fs::read_to_string(name).map_err(|_| {
+                Failure::before_start(format_args!(
+                    "--format {name}: no such file; the formats with a name are x-plane, flypt-mover and simtools"
+                ))
+            })?,
         };
-        Self::parse(&text).map_err(|reason| FormatError::Wrong(name.into(), reason))
+        Self::parse(&text).map_err(|reason| Failure::before_start(format_args!("--format {name}: {reason}")))
     }
 
     fn parse(text: &str) -> Result<Self, String> {
         let file: FormatFile = toml::from_str(text).map_err(|error| toml_error(text, &error))?;
-        let order = RotationOrder::ALL.into_iter().find(|order| order.name() == file.rotation);
+        let order = RotationOrder::by_name(&file.rotation);
         let order = order.ok_or("rotation must be xyz, xzy, yxz, yzx, zxy or zyx")?;
         let separator = match (file.encoding, file.separator.as_deref()) {
             (Encoding::Text, Some("space")) => ' ',

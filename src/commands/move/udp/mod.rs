@@ -17,9 +17,11 @@ use tracing::{info, warn};
 
 use self::receiver::{Arrived, Receiver};
 use self::status_feed::StatusFeed;
-use self::stream::{BLEND_S, StreamError, StreamOptions, seconds};
+use self::stream::{BLEND_S, StreamOptions};
 use self::survey::StreamSurvey;
-use super::PlaybackOptions;
+use super::{PlaybackOptions, no_signals};
+use crate::commands::failure::Failure;
+use crate::commands::motion_client::MotionError;
 use hexad_client::messages::Bus;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::operator::requests::status;
@@ -28,6 +30,7 @@ use hexad_client::realtime::pause_signals::PauseRequest;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::constants::Constants;
 use hexad_core::control::parameters::ViolationPolicy;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::task::pose_of;
 use hexad_daemon::constants;
 use hexad_daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
@@ -69,12 +72,14 @@ pub fn follow(
     options: &StreamOptions,
     playback: &PlaybackOptions,
     stop: &Stop,
-) -> Result<(), StreamError> {
+) -> Result<(), Failure> {
     if config.deployment.setpoint.on_violation != ViolationPolicy::Limit {
-        return Err(StreamError::Policy);
+        return Err(Failure::before_start(
+            "--udp: poses alone need setpoint.on_violation = \"limit\" in the machine file (now \"stop\")",
+        ));
     }
     let receiver = Receiver::open(config, address, options)?;
-    let (constants, pause) = (constants(config), PauseRequest::on_signals().map_err(StreamError::Signals)?);
+    let (constants, pause) = (constants(config), PauseRequest::on_signals().map_err(no_signals)?);
     let boarding = options.boarding.unwrap_or_else(|| lowest_comfortable(&constants, &config.machine.home));
     let checked = check_target(&constants, &pose_of(&boarding));
     checked.map_err(|bound| TargetError::from(TargetRefusal::Target(bound)))?;
@@ -93,7 +98,7 @@ pub fn follow(
     // The daemon goes on to the last target.
     let rest = ride.source.resting_x(&constants)?;
     (0..LAST_TARGETS).try_for_each(|_| ride.source.publish(rest))?;
-    Err(StreamError::Interrupted)
+    Err(MotionError::Interrupted.into())
 }
 
 /// Home, lowered along gravity by nine tenths of the way that the workspace permits.
@@ -122,7 +127,7 @@ struct Ride<'a> {
 
 impl Ride<'_> {
     /// Publishes the setpoint of one period. False at the end.
-    fn step(&mut self, is_paused: bool, is_ending: bool) -> Result<bool, StreamError> {
+    fn step(&mut self, is_paused: bool, is_ending: bool) -> Result<bool, Failure> {
         let (newest, now_ns) = (self.receiver.newest(), monotonic_ns());
         newest.iter().for_each(|it| self.survey(it));
         let order = self.describe(is_paused);
@@ -174,7 +179,7 @@ impl Ride<'_> {
                     self.board(RESTARTED);
                 } else if self.receiver.is_alive(now_ns) {
                     self.phase = Phase::following(x);
-                } else if seconds(since_ns, now_ns) > LONG_PAUSE_S {
+                } else if seconds_since(since_ns, now_ns) > LONG_PAUSE_S {
                     self.board("a long pause");
                 }
             }

@@ -6,9 +6,11 @@ use tracing::warn;
 
 use super::datagram_format::{Datagram, DatagramFormat, MAX_BYTES};
 use super::rejection::{Rejection, RejectionCounts};
-use super::stream::{StreamError, StreamOptions, blended, seconds};
+use super::stream::{StreamOptions, blended};
+use crate::commands::failure::Failure;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::source_clock::SourceClock;
+use hexad_core::control::signals::time::seconds_since;
 use hexad_core::model::task::pose_of;
 use hexad_machine::config::Config;
 
@@ -75,13 +77,16 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    pub fn open(config: &Config, address: SocketAddr, options: &StreamOptions) -> Result<Self, StreamError> {
-        let format = DatagramFormat::load(options.format.as_deref().ok_or(StreamError::NoFormat)?)?;
+    pub fn open(config: &Config, address: SocketAddr, options: &StreamOptions) -> Result<Self, Failure> {
+        let refused = |text: &str| Failure::before_start(format_args!("--udp {address}: {text}"));
+        let no_format =
+            || Failure::before_start("--udp: needs --format: x-plane, flypt-mover, simtools, or a file");
+        let format = DatagramFormat::load(options.format.as_deref().ok_or_else(no_format)?)?;
         if address.ip().is_unspecified() {
-            return Err(StreamError::AnyInterface(address));
+            return Err(refused("must be the address of one interface"));
         }
         if !address.ip().is_loopback() && options.from.is_empty() {
-            return Err(StreamError::NoSender(address));
+            return Err(refused("is open to other hosts: name those that may move the platform with --from"));
         }
         let socket = UdpSocket::bind(address).and_then(|socket| {
             socket.set_nonblocking(true)?;
@@ -89,7 +94,7 @@ impl Receiver {
         });
         let timeout_s = config.deployment.timeouts.setpoint_s;
         Ok(Self {
-            socket: socket.map_err(|error| StreamError::Socket(address, error))?,
+            socket: socket.map_err(|error| refused(&error.to_string()))?,
             format,
             from: options.from.clone(),
             home: config.machine.home,
@@ -156,7 +161,7 @@ impl Receiver {
         // A program that is started again has another port. Some have another for each datagram.
         let (before, count) = self.sender.unwrap_or((sender, 0));
         let is_restart = before != sender && count > 1;
-        if is_restart && seconds(self.heard_ns, arrival_ns) <= self.pause_s {
+        if is_restart && seconds_since(self.heard_ns, arrival_ns) <= self.pause_s {
             return Err(Rejection::Second(sender, before));
         }
         self.sender = Some((sender, if before == sender { count.saturating_add(1) } else { 1 }));
@@ -179,7 +184,7 @@ impl Receiver {
     }
 
     pub fn silence_s(&self, now_ns: u64) -> f64 {
-        seconds(self.last_ns, now_ns)
+        seconds_since(self.last_ns, now_ns)
     }
 
     pub fn is_alive(&self, now_ns: u64) -> bool {

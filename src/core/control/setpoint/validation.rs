@@ -100,7 +100,7 @@ impl SetpointValidator {
         let Some(SetpointMotion { setpoint, motion, .. }) = &self.last.valid else {
             return Err(self.last.rejection_or(DiagnosticCode::NoSetpoint));
         };
-        let is_followed = is_following(cycle.state);
+        let is_followed = cycle.state.follows();
         if is_followed && setpoint.kind == SetpointKind::Target {
             return Ok(());
         }
@@ -125,7 +125,7 @@ impl SetpointValidator {
     fn accept(&mut self, cycle: &Cycle<'_>, new: &SetpointMotion, reference: &ReferenceGenerator) -> bool {
         let (constants, now_ns) = (cycle.constants, cycle.release_ns);
         let parameters = &constants.parameters;
-        let followed = self.last.valid.as_ref().filter(|_| is_following(cycle.state));
+        let followed = self.last.valid.as_ref().filter(|_| cycle.state.follows());
         let timeout_ns = parameters.setpoint_timeout_ns;
         let stops = parameters.on_violation == ViolationPolicy::Stop;
         let mut near_limits = LimitSet::default();
@@ -148,7 +148,7 @@ impl SetpointValidator {
                 self.keeps_limits &= do_samples_keep_limits(cycle, new, &self.samples, reference);
             }
         }
-        self.last.record(&new.setpoint, result.map(|()| new), now_ns, is_following(cycle.state));
+        self.last.record(&new.setpoint, result.map(|()| new), now_ns, cycle.state.follows());
         result.is_ok()
     }
 }
@@ -167,10 +167,6 @@ fn check_return(
     let offset = reference.offset_to(constants, target);
     let ratio = offset.map_or(f64::INFINITY, |offset| parameters.engage_tolerance_ratio(&offset));
     if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0)) }
-}
-
-fn is_following(state: State) -> bool {
-    matches!(state, State::Engaging | State::Active)
 }
 
 /// Whether the motion through the samples keeps the limits, and while it is followed the reference keeps up with it.

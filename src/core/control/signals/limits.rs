@@ -25,61 +25,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::rigid::Acceleration;
 
-/// Limit by the number of its bit in a [`LimitSet`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Limit {
-    /// Actuator force, `actuator.max_force_n` \[N\].
-    Force = 0,
-    /// Change of an actuator's force, `limits.force_rate_n_s` \[N/s\].
-    ForceRate = 1,
-    /// Leg length, `actuator.min_length_m` to `actuator.max_length_m` \[m\].
-    Stroke = 2,
-    /// Rate of a leg's length, `actuator.max_rate_m_s` \[m/s\].
-    LegRate = 3,
-    /// Range of X, `[envelope]` \[rad\], \[m\].
-    Envelope = 4,
-    /// Velocity of the platform, `limits.velocity_*` times `limits.scale` \[rad/s\], \[m/s\].
-    Velocity = 5,
-    /// Acceleration of the platform, `limits.acceleration_*` times `limits.scale` \[rad/s^2\], \[m/s^2\].
-    Acceleration = 6,
-    /// Jerk of the platform, `limits.jerk_*` times `limits.scale` \[rad/s^3\], \[m/s^3\].
-    Jerk = 7,
-    /// Following error under control, `control.following_*` \[rad\], \[m\].
-    Following = 8,
-    /// Condition of the pose, `limits.condition`; without unit.
-    Condition = 9,
-}
-
-impl Limit {
-    /// Every limit, in the order of their bits.
-    pub const ALL: [Self; 10] = [
-        Self::Force,
-        Self::ForceRate,
-        Self::Stroke,
-        Self::LegRate,
-        Self::Envelope,
-        Self::Velocity,
-        Self::Acceleration,
-        Self::Jerk,
-        Self::Following,
-        Self::Condition,
-    ];
-
-    /// Name for people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Force => "force",
-            Self::ForceRate => "force rate",
-            Self::Stroke => "stroke",
-            Self::LegRate => "leg rate",
-            Self::Envelope => "envelope",
-            Self::Velocity => "velocity",
-            Self::Acceleration => "acceleration",
-            Self::Jerk => "jerk",
-            Self::Following => "following error",
-            Self::Condition => "condition",
-        }
+crate::named! {
+    /// Limit by the number of its bit in a [`LimitSet`].
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[repr(u32)]
+    pub enum Limit {
+        /// Actuator force, `actuator.max_force_n` \[N\].
+        Force = 0 => "force",
+        /// Change of an actuator's force, `limits.force_rate_n_s` \[N/s\].
+        ForceRate = 1 => "force rate",
+        /// Leg length, `actuator.min_length_m` to `actuator.max_length_m` \[m\].
+        Stroke = 2 => "stroke",
+        /// Rate of a leg's length, `actuator.max_rate_m_s` \[m/s\].
+        LegRate = 3 => "leg rate",
+        /// Range of X, `[envelope]` \[rad\], \[m\].
+        Envelope = 4 => "envelope",
+        /// Velocity of the platform, `limits.velocity_*` times `limits.scale` \[rad/s\], \[m/s\].
+        Velocity = 5 => "velocity",
+        /// Acceleration of the platform, `limits.acceleration_*` times `limits.scale` \[rad/s^2\], \[m/s^2\].
+        Acceleration = 6 => "acceleration",
+        /// Jerk of the platform, `limits.jerk_*` times `limits.scale` \[rad/s^3\], \[m/s^3\].
+        Jerk = 7 => "jerk",
+        /// Following error under control, `control.following_*` \[rad\], \[m\].
+        Following = 8 => "following error",
+        /// Condition of the pose, `limits.condition`; without unit.
+        Condition = 9 => "condition",
     }
 }
 

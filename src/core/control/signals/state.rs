@@ -22,32 +22,30 @@
 
 use serde::{Deserialize, Serialize};
 
-/// State of the controller, which decides whether forces are valid and which reference the platform follows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[repr(u32)]
-pub enum State {
-    /// No force: the pose is unknown, or an operator requested it.
-    #[default]
-    Off = 0,
-    /// No force; ready to engage.
-    Standby = 1,
-    /// Moves from the measured motion onto the setpoint, or holds its pose until setpoints arrive.
-    Engaging = 2,
-    /// Follows the setpoint.
-    Active = 3,
-    /// Decelerates to rest along a verified stop.
-    Stopping = 4,
-    /// Moves to the home pose.
-    Parking = 5,
-    /// No force until cleared.
-    Fault = 6,
+crate::named! {
+    /// State of the controller, which decides whether forces are valid and which reference the platform follows.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    #[repr(u32)]
+    pub enum State {
+        /// No force: the pose is unknown, or an operator requested it.
+        #[default]
+        Off = 0 => "off",
+        /// No force; ready to engage.
+        Standby = 1 => "standby",
+        /// Moves from the measured motion onto the setpoint, or holds its pose until setpoints arrive.
+        Engaging = 2 => "engaging",
+        /// Follows the setpoint.
+        Active = 3 => "active",
+        /// Decelerates to rest along a verified stop.
+        Stopping = 4 => "stopping",
+        /// Moves to the home pose.
+        Parking = 5 => "parking",
+        /// No force until cleared.
+        Fault = 6 => "fault",
+    }
 }
 
 impl State {
-    /// Every state, in the order of their numbers.
-    pub const ALL: [Self; 7] =
-        [Self::Off, Self::Standby, Self::Engaging, Self::Active, Self::Stopping, Self::Parking, Self::Fault];
-
     /// Whether the platform is under control: forces are valid in these states and in no other.
     pub fn has_control(self) -> bool {
         matches!(self, Self::Engaging | Self::Active | Self::Stopping | Self::Parking)
@@ -58,63 +56,37 @@ impl State {
         matches!(self, Self::Engaging | Self::Active)
     }
 
-    /// Name for people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Standby => "standby",
-            Self::Engaging => "engaging",
-            Self::Active => "active",
-            Self::Stopping => "stopping",
-            Self::Parking => "parking",
-            Self::Fault => "fault",
-        }
-    }
-
     /// Reads the number of a message.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|state| *state as u32 == number)
     }
 }
 
-/// Operator request, one per message. Of several requests within one cycle the last in this order takes
-/// effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(u32)]
-pub enum Request {
-    /// Take control and follow the setpoint.
-    Engage = 1,
-    /// Leave the fault.
-    Clear = 2,
-    /// Come to rest, go home, disable the forces.
-    Park = 3,
-    /// Come to rest, disable the forces.
-    Stop = 4,
-    /// Disable the forces at once; brakes close.
-    Off = 5,
-    /// Disable the forces at once, until cleared.
-    Estop = 6,
+crate::named! {
+    /// Operator request, one per message. Of several requests within one cycle the last in this order takes
+    /// effect.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[repr(u32)]
+    pub enum Request {
+        /// Take control and follow the setpoint.
+        Engage = 1 => "engage",
+        /// Leave the fault.
+        Clear = 2 => "clear",
+        /// Come to rest, go home, disable the forces.
+        Park = 3 => "park",
+        /// Come to rest, disable the forces.
+        Stop = 4 => "stop",
+        /// Disable the forces at once; brakes close.
+        Off = 5 => "off",
+        /// Disable the forces at once, until cleared.
+        Estop = 6 => "estop",
+    }
 }
 
 impl Request {
-    /// Every request, in ascending order of precedence.
-    pub const ALL: [Self; 6] = [Self::Engage, Self::Clear, Self::Park, Self::Stop, Self::Off, Self::Estop];
-
     /// Whether the request may begin control of the platform.
     pub fn can_begin_control(self) -> bool {
         matches!(self, Self::Engage | Self::Park)
-    }
-
-    /// Name for people; the command of the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Engage => "engage",
-            Self::Clear => "clear",
-            Self::Park => "park",
-            Self::Stop => "stop",
-            Self::Off => "off",
-            Self::Estop => "estop",
-        }
     }
 
     /// Reads the number of a message.

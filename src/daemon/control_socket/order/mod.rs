@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use crate::control_socket::answer::answer_line;
 use crate::process_names::sentence;
 use crate::snapshot::Snapshot;
 use hexad_client::operator::protocol::{AnswerLine, MAX_REQUEST_AGE_NS, RequestResult, STOPPED, is_stop};
@@ -107,7 +106,7 @@ impl PendingOrder {
                 Stage::Posting => self.answer(RequestResult::Superseded, snapshot, NOT_POSTED.into()),
                 _ => {
                     let text = format!("posted for the cycle at {cycle_ns} ns");
-                    Step::Progress(self.line(RequestResult::Waiting, snapshot, diagnostic(snapshot), text))
+                    Step::Progress(self.line(RequestResult::Waiting, snapshot, snapshot.diagnostic(), text))
                 }
             };
         }
@@ -150,7 +149,7 @@ impl PendingOrder {
 
     /// Answer to the client whose order a later request replaces.
     pub fn superseded(&self, snapshot: &Snapshot) -> AnswerLine {
-        self.line(RequestResult::Superseded, snapshot, diagnostic(snapshot), REPLACED.into())
+        self.line(RequestResult::Superseded, snapshot, snapshot.diagnostic(), REPLACED.into())
     }
 
     /// Tries to post the request. Before the first cycle is published, no request for control is posted that names none.
@@ -185,7 +184,7 @@ impl PendingOrder {
             let text = "accepted".into();
             return match self.completion(snapshot, now_ns) {
                 Step::Wait if self.order.waits => {
-                    Step::Progress(self.line(RequestResult::Accepted, snapshot, diagnostic(snapshot), text))
+                    Step::Progress(self.line(RequestResult::Accepted, snapshot, snapshot.diagnostic(), text))
                 }
                 Step::Wait => self.answer(RequestResult::Accepted, snapshot, text),
                 step => step,
@@ -193,7 +192,7 @@ impl PendingOrder {
         }
         let text = refusal_text(snapshot);
         // A fault ends only by an operator, so waiting does not help.
-        if self.order.is_patient && may_resolve(refusal.code) && state(snapshot) != State::Fault {
+        if self.order.is_patient && may_resolve(refusal.code) && snapshot.state() != State::Fault {
             // The cycle that it named has passed.
             (self.stage, self.since_ns, self.order.cycle_ns) = (Stage::Retrying, now_ns, None);
             if self.reported == refusal.code || now_ns > self.order.deadline_ns {
@@ -207,8 +206,8 @@ impl PendingOrder {
 
     /// Checks whether the state that the accepted request leads to is reached.
     fn completion(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
-        match outcome(self.order.request, state(snapshot)) {
-            Some(true) => self.answer(RequestResult::Done, snapshot, state(snapshot).name().into()),
+        match outcome(self.order.request, snapshot.state()) {
+            Some(true) => self.answer(RequestResult::Done, snapshot, snapshot.state().name().into()),
             Some(false) => self.answer(RequestResult::Failed, snapshot, state_text(snapshot)),
             None => self.check_deadline(snapshot, now_ns),
         }
@@ -217,7 +216,7 @@ impl PendingOrder {
     /// Checks a replaced stop. The real-time thread may not have read the replacing request yet.
     fn replaced(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
         let is_new = now_ns.saturating_sub(self.since_ns) <= ANSWER_LIMIT_NS;
-        if is_new && state(snapshot).has_control() {
+        if is_new && snapshot.state().has_control() {
             return self.check_deadline(snapshot, now_ns);
         }
         self.completion(snapshot, now_ns)
@@ -240,7 +239,7 @@ impl PendingOrder {
     }
 
     fn answer(&self, result: RequestResult, snapshot: &Snapshot, text: String) -> Step {
-        Step::Answer(self.line(result, snapshot, diagnostic(snapshot), text))
+        Step::Answer(self.line(result, snapshot, snapshot.diagnostic(), text))
     }
 
     fn line(
@@ -250,7 +249,7 @@ impl PendingOrder {
         diagnostic: Diagnostic,
         text: String,
     ) -> AnswerLine {
-        answer_line(result, self.order.request.name(), state(snapshot), &diagnostic, text)
+        snapshot.answer(result, self.order.request.name(), diagnostic, text)
     }
 }
 
@@ -278,25 +277,17 @@ fn may_resolve(code: DiagnosticCode) -> bool {
     !code.is_fault() && code != DiagnosticCode::OtherPoses || may_return.contains(&code)
 }
 
-fn state(snapshot: &Snapshot) -> State {
-    snapshot.status.state().unwrap_or_default()
-}
-
-fn diagnostic(snapshot: &Snapshot) -> Diagnostic {
-    snapshot.status.diagnostic.diagnostic().unwrap_or_default()
-}
-
 fn state_text(snapshot: &Snapshot) -> String {
-    format!("the daemon is in {}: {}", state(snapshot).name(), sentence(&diagnostic(snapshot)))
+    format!("the daemon is in {}: {}", snapshot.state().name(), sentence(&snapshot.diagnostic()))
 }
 
 /// Text of the last refusal, with what an operator must correct.
 fn refusal_text(snapshot: &Snapshot) -> String {
     let Snapshot { status, refusal, .. } = snapshot;
     let norm = |v: [f64; 3]| Vector3::from(v).norm();
-    match (refusal.code, state(snapshot)) {
+    match (refusal.code, snapshot.state()) {
         (DiagnosticCode::InvalidInState, State::Fault) => {
-            format!("not possible in state fault ({}); hexad clear first", diagnostic(snapshot).code.name())
+            format!("not possible in state fault ({}); hexad clear first", snapshot.diagnostic().code.name())
         }
         (DiagnosticCode::InvalidInState, state) => format!("not possible in state {}", state.name()),
         (DiagnosticCode::SetpointTooFar, _) if status.error_valid == 1 => format!(

@@ -140,7 +140,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         velocity_errors_by_friction(machine, &leg_masses, [orientation_bandwidth_hz, position_bandwidth_hz]);
     let (on_setpoint_lost, lost_hold_s) = setpoint_loss(&mut section);
     let mut up_to = |key, default, most| section.number_or(key, default, Bound::UpTo(most));
-    let control = Control {
+    Control {
         mode,
         position_bandwidth_hz,
         position_damping_ratio,
@@ -168,9 +168,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         on_setpoint_lost,
         lost_hold_s,
         leg_masses,
-    };
-    section.finish();
-    control
+    }
 }
 
 /// Goal of a platform that lost its setpoint, and the time for which it holds its pose before that.

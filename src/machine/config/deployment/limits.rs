@@ -92,7 +92,6 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     let held_pole = survey.iter().map(|pose| pose.pole).fold(0.0, f64::max);
     let reference = ReferenceLimits { position, orientation, autonomous_scale };
     check_turning(&section, machine, realtime, &survey, &reference, feedback_scale);
-    section.finish();
     DeploymentLimits {
         reference,
         scale,

@@ -142,7 +142,6 @@ fn setpoint(mut section: SectionReader) -> SetpointPolicy {
         ("arrival", ClockRule::Arrival),
     ];
     let clock = section.choice_or("clock", ClockRule::RealTime, &clocks);
-    section.finish();
     SetpointPolicy { on_violation, approach, holds_on_return, clock }
 }
 
@@ -157,7 +156,6 @@ fn in_position(mut section: SectionReader, noise: &SensorNoise, machine: &Machin
     let tolerance_rad = section.number_or("tolerance_rad", default(angular), bound);
     let longest = Bound::Within(0.0, MAX_SETTLING_MS);
     let settling_ms = section.number_or("settling_ms", DEFAULT_SETTLING_MS, longest);
-    section.finish();
     InPositionWindow { tolerance_m, tolerance_rad, settling_ns: (1e6 * settling_ms) as u64 }
 }
 
@@ -178,13 +176,11 @@ fn timeouts(
         let stable_ms = stable_ms(measured_ms).max(MIN_MEASURED_PERIODS * 1e3 / rate_hz);
         measured_ms = if stable_ms < measured_ms { rounded_down(stable_ms) } else { measured_ms };
     }
-    let timeouts = Timeouts {
+    Timeouts {
         setpoint_s: timeout_s(&mut section, "setpoint_ms", default_timeout_ms(setpoint_ms, rate_hz), rate_hz),
         measured_s: timeout_s(&mut section, "measured_ms", measured_ms, rate_hz),
         allow_unstable_age: section.flag_or("allow_unstable_age", false),
-    };
-    section.finish();
-    timeouts
+    }
 }
 
 /// Reads `[envelope]`: all four keys, or none. The reference keeps its poses; velocity and acceleration are requirements.
@@ -202,7 +198,6 @@ fn envelope(mut section: SectionReader) -> Option<envelope::EnvelopeBounds> {
             section.reject(key, "missing, must be given with the other keys of the section");
         }
     }
-    section.finish();
     let [Some(pose_min), Some(pose_max), Some(velocity), Some(acceleration)] = found else { return None };
     Some(envelope::EnvelopeBounds { pose_min, pose_max, velocity, acceleration })
 }

@@ -18,11 +18,9 @@ pub struct OperatorAccess {
 
 pub(super) fn read(mut section: SectionReader) -> OperatorAccess {
     let modes = [("0600", 0o600), ("0660", 0o660), ("0666", 0o666)];
-    let access = OperatorAccess {
+    OperatorAccess {
         group: section.optional_name("group", MAX_GROUP_LENGTH),
         mode: section.choice_or("mode", 0o660, &modes),
         read_group: section.optional_name("read_group", MAX_GROUP_LENGTH),
-    };
-    section.finish();
-    access
+    }
 }

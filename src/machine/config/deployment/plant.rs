@@ -77,23 +77,20 @@ pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) 
             format!("must be at least {MIN_STEP_US}: more tolerance_um, a softer leg, less friction"),
         );
     }
-    section.finish();
     plant
 }
 
 fn drive(mut section: SectionReader) -> DriveErrors {
     let dead_time_us = section.number_or("dead_time_us", 0.0, Bound::Within(0.0, MAX_DEAD_TIME_US));
-    let drive = DriveErrors {
-        bandwidth_hz: finite(section.number_or("bandwidth_hz", f64::INFINITY, Bound::Positive)),
+    DriveErrors {
+        bandwidth_hz: section.bounded_number("bandwidth_hz", Bound::Positive),
         force_step: section.number_or("force_step_n", 0.0, Bound::NotNegative),
         dead_time_ns: (1e3 * dead_time_us).round() as u64,
-    };
-    section.finish();
-    drive
+    }
 }
 
 fn friction(mut section: SectionReader) -> Friction {
-    let friction = Friction {
+    Friction {
         viscous: section.number_or("viscous_n_s_m", 0.0, Bound::NotNegative),
         coulomb: section.number_or("coulomb_n", 0.0, Bound::NotNegative),
         stiction: section.number_or("stiction_n", 0.0, Bound::NotNegative),
@@ -102,13 +99,11 @@ fn friction(mut section: SectionReader) -> Friction {
             Friction::STRIBECK_SPEED_M_S,
             Bound::Positive,
         ),
-    };
-    section.finish();
-    friction
+    }
 }
 
 fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
-    let stiffness = finite(section.number_or("stiffness_n_m", f64::INFINITY, Bound::Positive));
+    let stiffness = section.bounded_number("stiffness_n_m", Bound::Positive);
     let damping = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
     let backlash = section.number_or("backlash_m", 0.0, Bound::NotNegative);
     if stiffness.is_some() && machine.actuator.reflected_mass == 0.0 {
@@ -120,45 +115,33 @@ fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     if stiffness.is_none() && backlash > 0.0 {
         section.reject("backlash_m", "must be 0 without stiffness_n_m: the flanks of a backlash are springs");
     }
-    section.finish();
     stiffness.map(|stiffness| ElasticLeg { stiffness, damping, backlash })
 }
 
 fn sensor(mut section: SectionReader) -> SensorErrors {
     let mut number = |key| section.number_or(key, 0.0, Bound::NotNegative);
-    let sensor = SensorErrors {
+    SensorErrors {
         length_step: number("length_step_m"),
         rate_step: number("rate_step_m_s"),
         length_noise: number("length_noise_m"),
         rate_noise: number("rate_noise_m_s"),
-    };
-    section.finish();
-    sensor
+    }
 }
 
 fn build(mut section: SectionReader) -> BuildErrors {
-    let build = BuildErrors {
+    BuildErrors {
         payload: section.number_or("payload_kg", 0.0, Bound::NotNegative),
         payload_at: Vector3::from(section.vector_or("payload_position_m", [0.0; 3])),
         joints: section.number_or("joint_error_m", 0.0, Bound::NotNegative),
-    };
-    section.finish();
-    build
+    }
 }
 
 fn external(mut section: SectionReader) -> ExternalWrench {
-    let external = ExternalWrench {
+    ExternalWrench {
         wrench: Wrench {
             force: Vector3::from(section.vector_or("force_n", [0.0; 3])),
             torque: Vector3::from(section.vector_or("torque_n_m", [0.0; 3])),
         },
         frequency_hz: section.number_or("frequency_hz", 0.0, Bound::NotNegative),
-    };
-    section.finish();
-    external
-}
-
-/// Value of a key whose default, infinity, means that there is no limit.
-fn finite(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
+    }
 }

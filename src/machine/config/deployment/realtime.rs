@@ -201,7 +201,6 @@ pub(super) fn read(mut section: SectionReader) -> Realtime {
             "must be \"skip\" with realtime.release = \"lockstep\" (simulated time waits for the loop)",
         );
     }
-    section.finish();
     realtime
 }
 

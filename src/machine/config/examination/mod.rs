@@ -9,6 +9,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::control_loops::{ControlLoop, loops, unstable_timeout_ms};
 use super::deployment::control::optimum_hz;
+use super::syntax::line_at;
 use super::{Config, ConfigError, Violation};
 
 mod envelope;
@@ -137,10 +138,6 @@ fn line_of(text: &str, key: &str) -> usize {
         found = next;
     }
     line_at(text, found.span().start)
-}
-
-fn line_at(text: &str, offset: usize) -> usize {
-    1 + text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
 }
 
 #[cfg(test)]

@@ -21,6 +21,10 @@ struct Ratio {
     usual: RangeInclusive<f64>,
 }
 
+fn ratio(key: &'static str, ratio: f64, of: &'static str, usual: RangeInclusive<f64>) -> Ratio {
+    Ratio { key, ratio, of, usual }
+}
+
 pub(super) fn examine(examiner: &mut Examiner) {
     let gravity = examiner.config.machine.gravity.norm();
     if gravity != 0.0 && !(9.7..=9.9).contains(&gravity) {
@@ -63,7 +67,6 @@ fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let base_radius = base.iter().map(|joint| (joint - middle).norm()).sum::<f64>() / LEGS as f64;
     const LENGTH: &str = "actuator.min_length_m";
     const GYRATION: &str = "actuator.min_length_m (radius of gyration by inertia and mass)";
-    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
     vec![
         ratio(
             "platform.mass_kg",
@@ -101,7 +104,6 @@ fn drive_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let largest = |of_legs: &[f64; LEGS]| of_legs.iter().copied().fold(0.0, f64::max);
     let drives = DriveCapability::new(machine, &machine.home_pose());
     let held = drives.map_or(0.0, |drives| drives.hardest_held().1);
-    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
     let (force, stroke) = (actuator.max_force, actuator.max_length - actuator.min_length);
     const FORCE: &str = "actuator.max_force_n";
     vec![
@@ -141,7 +143,6 @@ fn limit_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let (limits, control) = (&examiner.config.deployment.limits, &examiner.config.deployment.control);
     let (linear, actuator) = (&limits.reference.position, &machine.actuator);
     let stroke = actuator.max_length - actuator.min_length;
-    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
     let payload = limits.payload_change_kg.unwrap_or_default() / machine.platform.mass;
     let [step, change] =
         [limits.disturbance_step_m_s2.unwrap_or_default(), control.disturbance_m_s2_per_sqrt_s]
@@ -174,7 +175,6 @@ fn sensor_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let per_step = if noise.length_step_m > 0.0 { noise.length_m / noise.length_step_m } else { 0.0 };
     let rate = noise.rate_m_s.unwrap_or_default() / actuator.max_rate;
     let tolerance = noise.pose_tolerance_m / noise.length_m;
-    let ratio = |key, ratio, of, usual| Ratio { key, ratio, of, usual };
     const NOISE: &str = "measured.length_noise_m";
     vec![
         ratio(NOISE, noise.length_m / stroke, "the stroke", 0.0..=1e-3),
@@ -234,5 +234,5 @@ fn pair_ratios(examiner: &Examiner) -> Vec<Ratio> {
     ];
     const FOLLOWING: &str = "the same of control.following";
     let named = |[first, second]: [&'static str; 2]| if examiner.is_stated(first) { first } else { second };
-    rows.into_iter().map(|(keys, ratio, of, usual)| Ratio { key: named(keys), ratio, of, usual }).collect()
+    rows.into_iter().map(|(keys, number, of, usual)| ratio(named(keys), number, of, usual)).collect()
 }
