@@ -1,6 +1,7 @@
 //! Compensation of disturbances: it removes what a wrong payload leaves, and does not wind up.
 
 use hexad::config::Config;
+use hexad::control::controller::Output;
 use hexad::control::signals::limits::Limit;
 use hexad::control::signals::state::{Request, State};
 use hexad::model::active_forces::InverseDynamics;
@@ -18,24 +19,46 @@ fn compensating(is_compensating: bool) -> Config {
     config
 }
 
-/// Position error after some seconds at home, with a platform a fifth heavier than the controller thinks.
-fn sag(config: &Config, seconds: u32) -> f64 {
+/// Mass of the platform, relative to what the controller thinks.
+const HEAVY: f64 = 1.2;
+
+/// Outputs of some seconds at home with a heavy platform, and its position error then \[m\].
+fn held(config: &Config, seconds: u32) -> (Vec<Output>, f64) {
     let mut heavy = config.machine.clone();
-    heavy.platform.mass *= 1.2;
+    heavy.platform.mass *= HEAVY;
     let mut rig = Rig::new(config, &heavy);
     let home = TaskState::at_rest(config.machine.home);
     rig.engage(&home);
-    (0..1000 * seconds).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
-    (rig.simulator().state().pose.position - home.motion().pose.position).norm()
+    let outputs: Vec<_> = (0..1000 * seconds).map(|_| rig.cycle(&rig.input(&home))).collect();
+    assert!(outputs.iter().all(|output| output.state == State::Active));
+    (outputs, (rig.simulator().state().pose.position - home.motion().pose.position).norm())
 }
 
 #[test]
 fn a_payload_of_a_fifth_leaves_nothing() {
-    let without = sag(&compensating(false), 4);
-    let with = sag(&compensating(true), 4);
+    let [without, with] = [false, true].map(|is_compensating| held(&compensating(is_compensating), 4).1);
     println!("without {without:e} m, with {with:e} m");
     assert!(without > 1e-4);
     assert!(with < 1e-3 * without, "{with} of {without}");
+}
+
+/// What is compensated has a bound. The cycle names it, also while feedback still holds the platform, a little below its place.
+#[test]
+fn a_payload_beyond_what_is_compensated_is_named() {
+    let mut config = compensating(true);
+    // More than of platform and legs together.
+    let disturbance = 9.81 * (1.0 - 1.0 / HEAVY);
+    for (compensated_share, is_named, most_sag_m) in
+        [(2.0, false, 1e-6), (0.75, false, 1e-6), (0.5, true, 1e-3)]
+    {
+        config.deployment.limits.reference.position.acceleration = 2.0 * compensated_share * disturbance;
+        let (outputs, sag_m) = held(&config, 2);
+
+        let is_at_bound = |output: &Output| output.active_limits.contains(Limit::Compensation);
+        assert_eq!(outputs.iter().any(is_at_bound), is_named, "{compensated_share}");
+        assert_eq!(outputs.iter().skip(1000).all(is_at_bound), is_named, "{compensated_share}");
+        assert!(sag_m < most_sag_m && (sag_m > 1e-5) == is_named, "{compensated_share}: {sag_m}");
+    }
 }
 
 /// The first start of the guide for commissioning, with drives limited to little more than the weight.

@@ -90,6 +90,7 @@
 #define HEXAD_LIMIT_BIT_JERK 7u
 #define HEXAD_LIMIT_BIT_FOLLOWING 8u
 #define HEXAD_LIMIT_BIT_CONDITION 9u
+#define HEXAD_LIMIT_BIT_COMPENSATION 10u
 
 /* First field of every message; the publisher fills it in. */
 struct hexad_header {

@@ -6,6 +6,7 @@ use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::law::force_limits::{ForceLimiter, LimitedForces};
 use crate::control::law::forces::forces;
 use crate::control::signals::diagnostic::Diagnostic;
+use crate::control::signals::limits::Limit;
 use crate::model::rigid::Motion;
 use crate::model::transmission::Transmission;
 
@@ -35,6 +36,7 @@ pub(in crate::control) fn actuate(
     let transmission = Transmission::of_motion(constants.machine(), &motion);
     let command = transmission.commands(&force);
     limiter.limit(cycle, &command, (&motion, &transmission), limited)?;
+    limited.active_limits.check(Limit::Compensation, parameters.law.compensation_ratio(&at_begin));
     if limited.command != command {
         let (machine, missing) = (constants.machine(), &limited.wrench_error);
         let missing =

@@ -129,6 +129,14 @@ impl Law {
         CommandedAcceleration(feedback + input_matrix.command(&estimate.disturbance))
     }
 
+    /// Largest ratio of the compensated disturbance to its bound.
+    pub(in crate::control) fn compensation_ratio(&self, estimate: &ErrorEstimate) -> f64 {
+        if !self.compensates_disturbance {
+            return 0.0;
+        }
+        estimate.disturbance.component_div(&self.max_compensated_disturbance).amax()
+    }
+
     /// Motion whose forces the mode commands. Computed torque: the predicted pose (reference minus predicted
     /// error), the reference twist, and reference plus feedback acceleration. The twist is not the estimated
     /// one, because friction forces of estimated rates would shake a platform at rest. Modes on legs: the

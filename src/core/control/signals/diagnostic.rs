@@ -427,7 +427,8 @@ codes! {
     FeedbackSaturated = 123, Brake,
         absolute("time of saturation", "s", "exceeds", "the longest time allowed,"),
         "feedback saturated",
-        "check for a collision, a payload, a drive without force; limits.feedback_scale";
+        "check for a collision, a payload, a drive without force, gravity's direction; if status names disturbance \
+         compensation, limits.acceleration_*, of which half is compensated; limits.feedback_scale";
 }
 
 impl DiagnosticCode {

@@ -50,6 +50,9 @@ crate::named! {
         Following = 8 => "following error",
         /// Condition of the pose, `limits.condition`; without unit.
         Condition = 9 => "condition",
+        /// Compensated disturbance, half of `limits.acceleration_*` without the scale \[rad/s^2\], \[m/s^2\]. What is beyond it, as of a payload or a
+        /// direction of gravity that the file lacks, remains as a following error.
+        Compensation = 10 => "disturbance compensation",
     }
 }
 
