@@ -201,7 +201,7 @@ impl<'a> Legs<'a> {
     /// Whether a region has no solution but known ones.
     fn decides(&self, mut region: Region, found: &mut Vec<KinematicState>, is_last: bool) -> bool {
         for _ in 0..MAX_NEWTON_STEPS {
-            let Some((middle, half)) = self.newton(&region) else { return false };
+            let Some((middle, half)) = self.newton(&region) else { break };
             let ([w, t], [rho, tau]) = (
                 [middle.fixed_rows::<3>(0).into_owned(), middle.fixed_rows::<3>(3).into_owned()],
                 [half.fixed_rows::<3>(0).norm(), half.fixed_rows::<3>(3).norm()],
