@@ -304,7 +304,11 @@ fn a_limit_that_is_five_percent_off_is_found_and_made_simple() {
 #[test]
 #[ignore = "second tier: takes long"]
 fn a_controller_that_is_wrong_is_found() {
-    let cases: [(&str, Doctor); 6] = [
+    let cases: [(&str, Doctor); 7] = [
+        ("reference stop", |_, parameters| {
+            parameters.limits.position.acceleration *= 0.95;
+            parameters.limits.orientation.acceleration *= 0.95;
+        }),
         ("stop time", |_, parameters| {
             parameters.limits.position.acceleration *= 0.5;
             parameters.limits.orientation.acceleration *= 0.5;

@@ -10,10 +10,10 @@ use hexad_support::extremes::Extremes;
 use hexad_support::search::climb::{Found, Search, fails, search};
 use hexad_support::search::genome::{Genome, Sensors, World};
 use hexad_support::search::machines::MACHINES;
-use hexad_support::search::property::{self, PROPERTIES, Property};
+use hexad_support::search::property::{self, PROPERTIES, Property, place};
 use hexad_support::search::run::{run, run_with};
 use hexad_support::search::scenario::Scenario;
-use hexad_support::search::table;
+use hexad_support::search::table::{self, Row};
 use hexad_support::{kept_files, repository};
 
 use super::trace;
@@ -75,6 +75,34 @@ fn explain(violations: &[&Found]) -> String {
     text
 }
 
+/// Least parts of all runs in which the sensors are these: what docs/safety.md says, less the runs that are known and those of the start.
+const LEAST: [(Sensors, f64); 4] =
+    [(Sensors::Exact, 0.2), (Sensors::Lengths, 0.1), (Sensors::Mixed, 0.04), (Sensors::Frozen, 0.02)];
+
+/// Worlds that were left out: sensors of too few runs, and properties that were judged in no run of a world where they are claimed.
+fn left_out(rows: &[Row]) -> Vec<String> {
+    let judged = |world: World, sensors: Sensors, property: usize| {
+        rows.iter().map(|row| row.judged[world as usize][sensors as usize][property]).sum::<u64>()
+    };
+    let (runs, always) = (rows.iter().map(|row| row.runs).sum::<u64>(), place("reference velocity"));
+    let mut left_out = Vec::new();
+    for (sensors, least) in LEAST {
+        let count = World::ALL.map(|world| judged(world, sensors, always)).iter().sum::<u64>();
+        if (count as f64) < least * runs as f64 {
+            left_out.push(format!("{sensors:?}: {count} of {runs} runs"));
+        }
+        for world in World::ALL {
+            let claimed = PROPERTIES.iter().enumerate().filter(|(_, property)| {
+                property.worlds.contains(&world)
+                    && (property.with_frozen_sensors || sensors != Sensors::Frozen)
+            });
+            let unjudged = claimed.filter(|(index, _)| judged(world, sensors, *index) == 0);
+            left_out.extend(unjudged.map(|(_, it)| format!("{}: {world:?}, {sensors:?}", it.name)));
+        }
+    }
+    left_out
+}
+
 #[test]
 fn certificate_no_search_finds_a_motion_beyond_a_limit() {
     let kinds = 2 * MACHINES.len() as u64;
@@ -92,16 +120,7 @@ fn certificate_no_search_finds_a_motion_beyond_a_limit() {
         rows.iter().all(|row| row.cycles.iter().all(|cycles| *cycles > 0)),
         "a machine was never under control"
     );
-    // None of the worlds was left out.
-    let runs_of = |world: World, sensors: Sensors| {
-        rows.iter().map(|row| row.runs_of[world as usize][sensors as usize]).sum::<u64>()
-    };
-    for world in World::ALL {
-        assert!(
-            Sensors::ALL.into_iter().all(|sensors| runs_of(world, sensors) > 0),
-            "{world:?} without some sensors"
-        );
-    }
+    assert_eq!(left_out(&rows), [""; 0]);
     certificate
         .finish(format_args!("{cycles} cycles of each machine and policy, {} violations", violations.len()));
     assert!(violations.is_empty(), "{} beyond a limit:\n{}", violations.len(), explain(&violations));

@@ -17,8 +17,7 @@ const WORTH_PRINTING: f64 = 0.9;
 /// Prints a cycle in which the state changed or a quantity was never as large.
 pub fn print(observed: &Rig, input: &Input, output: &Output, before: &mut Extremes) {
     let now = observed.meter().extremes;
-    let grown: Vec<_> = Quantity::ALL
-        .into_iter()
+    let grown: Vec<_> = Quantity::all()
         .filter(|quantity| now.of(*quantity) > before.of(*quantity).max(WORTH_PRINTING * quantity.allowed()))
         .map(|quantity| format!("{} {:.4}", quantity.name(), now.of(quantity)))
         .collect();

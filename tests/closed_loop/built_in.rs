@@ -20,13 +20,6 @@ use hexad_support::rig::Rig;
 use hexad_support::{data, deployed};
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
-const MOTIONS: [BuiltInMotion; 5] = [
-    BuiltInMotion::Settle,
-    BuiltInMotion::MinimumJerk,
-    BuiltInMotion::Sines,
-    BuiltInMotion::Circle,
-    BuiltInMotion::Paper,
-];
 
 /// Makes one limit tighter.
 type Tighten = fn(&mut Config);
@@ -117,7 +110,7 @@ fn certificate_what_the_precheck_accepts_is_followed() {
         with_force(name, share * held)
     };
     let all = MACHINES.into_iter().flat_map(|name| [1.5, 2.0, 3.0, 100.0].map(|share| weak(name, share)));
-    let all = all.flat_map(|config| MOTIONS.map(|motion| (config.clone(), motion)));
+    let all = all.flat_map(|config| BuiltInMotion::ALL.map(|motion| (config.clone(), motion)));
     cases(all, 7).into_par_iter().for_each(|(config, motion)| {
         let scene = fit(&config.machine, motion, 2.0);
         let precheck = Precheck::new(&config);
@@ -155,7 +148,7 @@ fn leave_a_reserve_of_the_rates_of_the_legs() {
 
 #[test]
 fn certificate_of_every_length_are_accepted() {
-    let motions = MOTIONS.into_iter().flat_map(|motion| [0.5, 1.0, 2.0, 8.0].map(|s| (motion, s)));
+    let motions = BuiltInMotion::ALL.into_iter().flat_map(|motion| [0.5, 1.0, 2.0, 8.0].map(|s| (motion, s)));
     let all = MACHINES.into_iter().flat_map(|name| motions.clone().map(move |(motion, s)| (name, motion, s)));
     cases(all, 5).into_par_iter().for_each(|(name, motion, seconds)| {
         let config = deployed(name);
@@ -175,7 +168,7 @@ fn of_the_usual_length_lose_nothing() {
         for timeout_s in [0.05, 0.2] {
             let mut config = deployed(name);
             config.deployment.timeouts.setpoint_s = timeout_s;
-            for motion in MOTIONS {
+            for motion in BuiltInMotion::ALL {
                 assert_eq!(
                     share(&config, &shaped(&config, motion, 8.0)),
                     1.0,

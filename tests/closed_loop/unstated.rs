@@ -19,13 +19,6 @@ use hexad_support::edited::configured;
 use hexad_support::rig::Rig;
 
 const MACHINES: [&str; 4] = ["motion_base", "fried2008", "tsai2000", "reference"];
-const MOTIONS: [BuiltInMotion; 5] = [
-    BuiltInMotion::Settle,
-    BuiltInMotion::MinimumJerk,
-    BuiltInMotion::Sines,
-    BuiltInMotion::Circle,
-    BuiltInMotion::Paper,
-];
 /// Time to engage and to estimate the disturbance \[s\].
 const SETTLED_S: f64 = 2.0;
 /// Duration of the motion, as in `hexad demo` \[s\].
@@ -36,7 +29,7 @@ const LONG_EPISODES: u64 = 400;
 /// One world by chance; why control ended.
 fn episode(seed: u64) -> Result<(), String> {
     let machine = MACHINES[seed as usize % MACHINES.len()];
-    let motion = MOTIONS[seed as usize / MACHINES.len() % MOTIONS.len()];
+    let motion = BuiltInMotion::ALL[seed as usize / MACHINES.len() % BuiltInMotion::ALL.len()];
     let mut random = Random::new(seed);
     let mut between = |least: f64, most: f64| least + (most - least) * random.uniform();
     let config = configured(machine, "");
@@ -93,7 +86,7 @@ fn play(config: &Config, imperfections: &Imperfections, motion: BuiltInMotion) -
 #[ignore = "second tier: takes long"]
 fn friction_of_a_mirror_is_no_fault() {
     let config = Config::load(&data("mirror_unknown_friction", "toml")).unwrap();
-    for motion in MOTIONS {
+    for motion in BuiltInMotion::ALL {
         assert_eq!(play(&config, &config.deployment.plant.imperfections, motion), Ok(()), "{motion:?}");
     }
 }

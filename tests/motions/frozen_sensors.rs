@@ -3,11 +3,10 @@
 
 use super::heave::{FADE_S, Heave, amplitude};
 use super::report::{Report, Runs};
-use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::Measurement;
 use hexad_support::deployed;
 use hexad_support::extremes::{MOTION_ALLOWANCE, Quantity};
-use hexad_support::rig::{Rig, parameters};
+use hexad_support::rig::parameters;
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 /// Angular frequencies of the vertical sines \[rad/s\].
@@ -43,40 +42,28 @@ fn frozen_sensors_lead_to_no_acceleration_beyond_the_limits_and_to_a_fault() {
         let parameters = parameters(&config);
         let heave = Heave::new(&config.machine, &parameters);
         let mut runs = Runs::default();
-        let mut ended_otherwise = Vec::new();
+        let mut without_fault = 0.0;
         for (omega, phase) in SINES_RAD_S.iter().flat_map(|omega| PHASES.map(|phase| (omega, phase))) {
             let amplitude = amplitude(&parameters, &config.machine, &heave, *omega);
             let sine = |t| heave.sine(heave.middle(), amplitude, *omega, t);
             let quarter_s = 0.25 * core::f64::consts::TAU / omega;
             let turns = (FADE_S / (4.0 * quarter_s)).ceil();
             let frozen_s = (4.0 * turns + phase) * quarter_s;
-            let mut observed = Rig::standing(&config, parameters, &sine(0.0));
-            observed.rates = runs.rates();
-            observed.engage(&sine(0.0));
-            let start_s = observed.time_s();
             let mut frozen: Option<Measurement> = None;
-            let mut code = DiagnosticCode::None;
-            while observed.time_s() < start_s + frozen_s + AFTER_S {
-                let t = observed.time_s() - start_s;
-                let mut input = observed.input(&sine(t));
+            let last = runs.play((&config, parameters), &sine, frozen_s + AFTER_S, |rig, t| {
+                let mut input = rig.input(&sine(t));
                 if t >= frozen_s {
-                    let frozen = frozen.get_or_insert_with(|| observed.measurement());
-                    input.measurement = Some(Measurement { time_ns: observed.now_ns, ..*frozen });
+                    let frozen = frozen.get_or_insert_with(|| rig.measurement());
+                    input.measurement = Some(Measurement { time_ns: rig.now_ns, ..*frozen });
                 }
-                let output = observed.cycle(&input);
-                if !output.state.has_control() {
-                    code = output.diagnostic.code;
-                    break;
-                }
-            }
-            if !code.is_fault() {
-                ended_otherwise.push((omega, phase, code));
-            }
-            runs.add(&observed);
+                input
+            });
+            without_fault +=
+                f64::from(u32::from(last.state.has_control() || !last.diagnostic.code.is_fault()));
         }
         let ratio = parameters.following_velocity / parameters.limits.position.velocity;
         report.add_with(name, &runs, |quantity| allowed(quantity, ratio));
-        report.bound(name, "runs without a fault", ended_otherwise.len() as f64, 0.0);
+        report.bound(name, "runs without a fault", without_fault, 0.0);
     }
     report.assert();
 }

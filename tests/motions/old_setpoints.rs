@@ -7,7 +7,7 @@ use hexad::control::signals::inputs::Setpoint;
 use hexad::model::task::TaskState;
 use hexad_support::deployed;
 use hexad_support::fast::Fast;
-use hexad_support::rig::{Rig, parameters};
+use hexad_support::rig::parameters;
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 const AGES_NS: [u64; 3] = [20_000_000, 30_000_000, 45_000_000];
@@ -16,19 +16,10 @@ const SINES_RAD_S: [f64; 4] = [5.0, 10.0, 25.0, 60.0];
 const DURATION_S: f64 = 5.0;
 
 fn follow_late(config: &Config, motion: &dyn Fn(f64) -> TaskState, age_ns: u64, runs: &mut Runs) {
-    let mut observed = Rig::standing(config, parameters(config), &motion(0.0));
-    observed.rates = runs.rates();
-    observed.engage(&motion(0.0));
-    let start_s = observed.time_s();
-    while observed.time_s() < start_s + DURATION_S {
-        let task = motion(observed.time_s() - start_s - age_ns as f64 * 1e-9);
-        let setpoint = Setpoint::motion(observed.now_ns - age_ns, task);
-        let output = observed.cycle(&observed.input_with(Some(setpoint)));
-        if !output.state.has_control() {
-            break;
-        }
-    }
-    runs.add(&observed);
+    runs.play((config, parameters(config)), motion, DURATION_S, |rig, t| {
+        let task = motion(t - age_ns as f64 * 1e-9);
+        rig.input_with(Some(Setpoint::motion(rig.now_ns - age_ns, task)))
+    });
 }
 
 #[test]

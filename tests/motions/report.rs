@@ -2,6 +2,11 @@
 
 use std::fmt::Write;
 
+use hexad::config::Config;
+use hexad::control::controller::Output;
+use hexad::control::parameters::Parameters;
+use hexad::control::signals::inputs::Input;
+use hexad::model::task::TaskState;
 use hexad_support::extremes::{Extremes, Quantity};
 use hexad_support::rig::{Rates, Rig};
 
@@ -32,6 +37,29 @@ impl Runs {
     /// For the next run: each in turn.
     pub fn rates(&self) -> Rates {
         Rates::ALL[self.count as usize % Rates::ALL.len()]
+    }
+
+    /// A platform that stands at the start of a motion, engages, and gets an input at each time since then, until an end \[s\] or
+    /// until control ends. Returns the last output.
+    pub fn play(
+        &mut self,
+        (config, parameters): (&Config, Parameters),
+        motion: &dyn Fn(f64) -> TaskState,
+        end_s: f64,
+        mut input: impl FnMut(&Rig, f64) -> Input,
+    ) -> Output {
+        let mut observed = Rig::standing(config, parameters, &motion(0.0));
+        observed.rates = self.rates();
+        observed.engage(&motion(0.0));
+        let (start_s, mut output) = (observed.time_s(), Output::default());
+        while observed.time_s() < start_s + end_s {
+            output = observed.cycle(&input(&observed, observed.time_s() - start_s));
+            if !output.state.has_control() {
+                break;
+            }
+        }
+        self.add(&observed);
+        output
     }
 
     pub fn add(&mut self, observed: &Rig) {
@@ -69,7 +97,7 @@ impl Report {
             1e3 * distance_m
         )
         .unwrap();
-        for quantity in Quantity::ALL {
+        for quantity in Quantity::all() {
             let (value, allowed) = (extremes.of(quantity), allowed(quantity));
             if value > allowed {
                 let at = extremes.instant_ns(quantity);

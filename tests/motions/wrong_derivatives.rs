@@ -5,7 +5,7 @@ use super::report::{Report, Runs};
 use hexad::model::task::TaskState;
 use hexad_support::certificate::cases;
 use hexad_support::edited::{config, deployed_table, set};
-use hexad_support::rig::{Rig, parameters};
+use hexad_support::rig::parameters;
 
 const MACHINES: [&str; 2] = ["reference", "motion_base"];
 const RATES_HZ: [f64; 4] = [250.0, 1000.0, 10_000.0, 20_000.0];
@@ -37,18 +37,7 @@ fn certificate_wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
                 let task = heave.sine(heave.middle(), amplitude, omega, t);
                 TaskState { x: task.x, xd: task.xd * sent_rate, xdd: task.xdd * sent_accel }
             };
-            let mut observed = Rig::standing(&config, parameters, &sine(0.0));
-            observed.rates = runs.rates();
-            observed.engage(&sine(0.0));
-            let start_s = observed.time_s();
-            while observed.time_s() < start_s + DURATION_S {
-                let task = sine(observed.time_s() - start_s);
-                let output = observed.cycle(&observed.input(&task));
-                if !output.state.has_control() {
-                    break;
-                }
-            }
-            runs.add(&observed);
+            runs.play((&config, parameters), &sine, DURATION_S, |rig, t| rig.input(&sine(t)));
         }
         report.add(&format!("{name} at {rate_hz} Hz"), &runs);
     }

@@ -38,6 +38,28 @@ fn halving_the_step_divides_the_error_by_sixteen() {
     }
 }
 
+/// A velocity that turns its axis: dynamics have no part in this error, only the order of the rotation has.
+#[test]
+fn an_attitude_whose_axis_turns_has_order_four() {
+    let acceleration = |state: &PlantState, _: f64| {
+        let angular = Vector3::z().cross(&state.platform.twist.angular);
+        let platform = Acceleration { angular, linear: Vector3::zeros() };
+        Some(Accelerations { platform, drives: Vector6::zeros() })
+    };
+    let mut start = home(&machine("fried2008"));
+    start.twist.angular = Vector3::x() * 10.0;
+    let [coarse, fine, exact] = [16_u32, 32, 512].map(|steps| {
+        let mut state = PlantState { platform: start, drives: DriveStates::default() };
+        for _ in 0..steps {
+            state =
+                hexad::plant::integrator::integrate(&state, 1.0 / f64::from(steps), acceleration).unwrap();
+        }
+        state.platform
+    });
+    let ratio = distance(&coarse, &exact) / distance(&fine, &exact);
+    assert!((14.0..18.0).contains(&ratio), "{ratio}");
+}
+
 #[test]
 fn the_default_step_is_exact_beside_a_micrometre() {
     for name in ["fried2008", "motion_base", "tsai2000"] {

@@ -119,7 +119,8 @@ fn certificate_no_pose_is_reached_that_the_drives_cannot_leave() {
         .collect();
     let largest = searched.into_iter().fold(0.0, f64::max);
     println!("largest share of the force {largest:.4}");
-    assert!(largest < 1.0 && largest > 0.9, "{largest}");
+    // Of what the drives can give a stop may take this share, and the reference none beyond it.
+    assert!(largest <= 0.95 && largest > 0.9, "{largest}");
 }
 
 /// A motion to a target among weak poses, for which the drives give less and less acceleration, ends there and not beyond; only a

@@ -38,71 +38,51 @@ pub enum Quantity {
     ReferenceStroke,
 }
 
+/// Of each quantity the name, and the largest value that is no violation; in the order of their declaration.
+const TABLE: [(Quantity, &str, f64); 14] = [
+    (Quantity::Velocity, "velocity", MOTION),
+    (Quantity::AngularVelocity, "angular velocity", MOTION),
+    (Quantity::LegRate, "leg rate", MOTION),
+    (Quantity::Acceleration, "acceleration", MOTION),
+    (Quantity::AngularAcceleration, "angular acceleration", MOTION),
+    (Quantity::Stroke, "stroke", 1.0),
+    (Quantity::Envelope, "envelope", 1.0),
+    (Quantity::Condition, "condition", MOTION),
+    (Quantity::Engaging, "engaging", 1.0),
+    (Quantity::Following, "following", 1.0),
+    (Quantity::ReferenceVelocity, "reference velocity", REFERENCE),
+    (Quantity::ReferenceAcceleration, "reference acceleration", REFERENCE),
+    (Quantity::ReferenceJerk, "reference jerk", REFERENCE),
+    (Quantity::ReferenceStroke, "reference stroke", REFERENCE_ALLOWANCE),
+];
+const MOTION: f64 = 1.0 + MOTION_ALLOWANCE;
+const REFERENCE: f64 = 1.0 + REFERENCE_ALLOWANCE;
+
 impl Quantity {
-    pub const ALL: [Self; 14] = [
-        Self::Velocity,
-        Self::AngularVelocity,
-        Self::LegRate,
-        Self::Acceleration,
-        Self::AngularAcceleration,
-        Self::Stroke,
-        Self::Envelope,
-        Self::Condition,
-        Self::Engaging,
-        Self::Following,
-        Self::ReferenceVelocity,
-        Self::ReferenceAcceleration,
-        Self::ReferenceJerk,
-        Self::ReferenceStroke,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.into_iter().map(|(quantity, ..)| quantity)
+    }
 
     /// The largest value that is no violation.
     pub fn allowed(self) -> f64 {
-        match self {
-            Self::Velocity
-            | Self::AngularVelocity
-            | Self::LegRate
-            | Self::Acceleration
-            | Self::AngularAcceleration
-            | Self::Condition => 1.0 + MOTION_ALLOWANCE,
-            Self::Stroke | Self::Envelope | Self::Engaging | Self::Following => 1.0,
-            Self::ReferenceVelocity | Self::ReferenceAcceleration | Self::ReferenceJerk => {
-                1.0 + REFERENCE_ALLOWANCE
-            }
-            Self::ReferenceStroke => REFERENCE_ALLOWANCE,
-        }
+        TABLE[self as usize].2
     }
 
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Velocity => "velocity",
-            Self::AngularVelocity => "angular velocity",
-            Self::LegRate => "leg rate",
-            Self::Acceleration => "acceleration",
-            Self::AngularAcceleration => "angular acceleration",
-            Self::Stroke => "stroke",
-            Self::Envelope => "envelope",
-            Self::Condition => "condition",
-            Self::Engaging => "engaging",
-            Self::Following => "following",
-            Self::ReferenceVelocity => "reference velocity",
-            Self::ReferenceAcceleration => "reference acceleration",
-            Self::ReferenceJerk => "reference jerk",
-            Self::ReferenceStroke => "reference stroke",
-        }
+        TABLE[self as usize].1
     }
 }
 
 /// Largest value of each quantity, and the instant at which it occurred.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extremes {
-    value: [f64; Quantity::ALL.len()],
-    at_ns: [u64; Quantity::ALL.len()],
+    value: [f64; TABLE.len()],
+    at_ns: [u64; TABLE.len()],
 }
 
 impl Default for Extremes {
     fn default() -> Self {
-        Self { value: [f64::NEG_INFINITY; Quantity::ALL.len()], at_ns: [0; Quantity::ALL.len()] }
+        Self { value: [f64::NEG_INFINITY; TABLE.len()], at_ns: [0; TABLE.len()] }
     }
 }
 
@@ -126,14 +106,14 @@ impl Extremes {
     }
 
     pub fn merge(&mut self, other: &Self) {
-        for quantity in Quantity::ALL {
+        for quantity in Quantity::all() {
             self.add(quantity, other.of(quantity), other.instant_ns(quantity));
         }
     }
 
     /// Every quantity beyond what is allowed, with its value.
     pub fn violations(&self) -> Vec<(Quantity, f64)> {
-        let values = Quantity::ALL.into_iter().map(|quantity| (quantity, self.of(quantity)));
+        let values = Quantity::all().map(|quantity| (quantity, self.of(quantity)));
         values.filter(|(quantity, value)| *value > quantity.allowed()).collect()
     }
 }

@@ -104,12 +104,14 @@ impl Search {
         let row = &mut self.row;
         row.runs += 1;
         row.cycles[genome.policy as usize] += outcome.cycles;
-        row.runs_of[genome.world as usize][genome.sensors as usize] += 1;
+        let judged = &mut row.judged[genome.world as usize][genome.sensors as usize];
+        let is_as_named = genome.sensors.have_sent(outcome.measured);
         for (index, property) in PROPERTIES.iter().enumerate() {
             let value = outcome.worst[index];
             if !property.is_claimed(genome) || value == f64::NEG_INFINITY {
                 continue;
             }
+            judged[index] += u64::from(is_as_named);
             row.worst[index] = row.worst[index].max(value);
             row.violations[index] += u64::from(fails(genome, index, &outcome));
             let pool = &mut self.pools[genome.policy as usize][index];
@@ -155,6 +157,13 @@ impl Search {
     /// Searches until so many cycles were under control with each policy, and at least for so long; `advance` counts them.
     pub fn climb(&mut self, seed: u64, cycles: u64, least: Duration, advance: impl Fn(u64)) {
         let began = Instant::now();
+        // A stop in each world with each of the sensors, by every other machine: however short the search is, what is claimed is judged there.
+        let mut random = Random::new(seed ^ (self.row.machine as u64) << 56);
+        let all = World::ALL.into_iter().flat_map(|world| Sensors::ALL.map(|sensors| (world, sensors)));
+        for (world, sensors) in all.skip(self.row.machine % 2).step_by(2) {
+            let policy = ViolationPolicy::Stop;
+            self.add(&Genome::random(self.row.machine, policy, sensors, world, &mut random).stopped());
+        }
         let counted = |row: &Row| row.cycles.iter().map(|done| *done.min(&cycles)).sum::<u64>();
         advance(counted(&self.row));
         while (counted(&self.row) < 2 * cycles || began.elapsed() < least) && !self.is_found() {

@@ -4,6 +4,7 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use hexad::control::parameters::ViolationPolicy;
+use hexad::control::signals::state::Request;
 use hexad::model::random::Random;
 
 use super::machines::MACHINES;
@@ -42,6 +43,16 @@ impl Sensors {
             Self::Mixed => "mixed",
             Self::Frozen => "frozen",
         }
+    }
+
+    /// Whether so many measurements without and with rates are what they send.
+    pub fn have_sent(self, [without, with]: [u64; 2]) -> bool {
+        let expected = match self {
+            Self::Exact | Self::Frozen => [false, true],
+            Self::Lengths => [true, false],
+            Self::Mixed => [true, true],
+        };
+        [without > 0, with > 0] == expected
     }
 
     pub fn rates(self) -> Rates {
@@ -104,6 +115,14 @@ impl Genome {
         let mut reader = Reader { random: Some(random), ..Reader::new(&empty) };
         Scenario::read(&empty, &mut reader);
         Self { genes: reader.genes, ..empty }
+    }
+
+    /// The same with a request to stop in the middle of the run.
+    pub fn stopped(mut self) -> Self {
+        let place = Request::ALL.iter().position(|request| *request == Request::Stop).unwrap();
+        let word = (place as f64 + 0.5) / Request::ALL.len() as f64;
+        self.genes.extend([("request_1.at".into(), 0.93), ("request_1.word".into(), word)]);
+        self
     }
 
     pub fn is_frozen(&self) -> bool {

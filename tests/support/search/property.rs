@@ -5,11 +5,12 @@
 use hexad::control::controller::Output;
 use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::signals::limits::{DerivativeLimits, Limits};
-use hexad::model::rigid::Twist;
+use hexad::model::rigid::{Motion, Twist};
+use nalgebra::Vector3;
 
 use super::genome::{Genome, World};
 use super::run::Faults;
-use crate::extremes::Quantity;
+use crate::extremes::{Quantity, REFERENCE_ALLOWANCE};
 use crate::rig::Rig;
 
 /// A cycle, after the platform has moved.
@@ -17,12 +18,22 @@ pub struct Moment<'a> {
     pub rig: &'a Rig,
     pub before: &'a Output,
     pub output: &'a Output,
-    /// Since a request for a stop under control, after which none for control came, and the longest that it may take \[s\].
-    pub stop_s: Option<[f64; 2]>,
+    pub stop: Option<Stop>,
     pub faults: Faults,
     pub policy: ViolationPolicy,
     /// Between the references of both policies, while "stop" has refused no setpoint \[m\], \[rad\].
     pub policies_apart: Option<f64>,
+}
+
+/// A request for a stop under control, after which none for control came.
+#[derive(Clone, Copy)]
+pub struct Stop {
+    /// When it came \[s\].
+    pub at_s: f64,
+    /// The longest that it may take until the state says so \[s\].
+    pub longest_s: f64,
+    /// The longest that the reference may move \[s\].
+    pub planned_s: Option<f64>,
 }
 
 /// How a property is judged.
@@ -62,7 +73,7 @@ const fn of_reference(quantity: Quantity, claim: &'static str) -> Property {
 }
 
 /// Every property.
-pub const PROPERTIES: [Property; 17] = [
+pub const PROPERTIES: [Property; 18] = [
     of_motion(Quantity::Velocity, "C is at most 2 % faster than `limits.velocity_m_s`", MODEL),
     of_motion(
         Quantity::AngularVelocity,
@@ -109,7 +120,18 @@ pub const PROPERTIES: [Property; 17] = [
         worlds: EVERYWHERE,
         with_frozen_sensors: true,
         judge: Judge::Cycle(1.0, |moment| {
-            moment.stop_s.map_or(f64::NEG_INFINITY, |[since, most]| since / most)
+            moment.stop.map_or(f64::NEG_INFINITY, |stop| (moment.rig.time_s() - stop.at_s) / stop.longest_s)
+        }),
+    },
+    Property {
+        name: "reference stop",
+        claim: "the reference rests when the stop from its own v and a with A and J ends (3.02 A/J later where v and a are not in one line)",
+        worlds: EVERYWHERE,
+        with_frozen_sensors: true,
+        judge: Judge::Cycle(1.0 + REFERENCE_ALLOWANCE, |moment| {
+            let moves = moment.output.reference.is_some_and(|motion| motion.twist != Twist::default());
+            let stop = moment.stop.filter(|_| moves).and_then(|stop| Some((stop.at_s, stop.planned_s?)));
+            stop.map_or(f64::NEG_INFINITY, |(at_s, planned_s)| (moment.rig.time_s() - at_s) / planned_s)
         }),
     },
     Property {
@@ -127,6 +149,27 @@ pub fn longest_stop_s(parameters: &Parameters, twist: &Twist) -> f64 {
     let time_s = |v: f64, of: &DerivativeLimits| v / of.acceleration + 2.5 * of.acceleration / of.jerk;
     let Limits { position, orientation, .. } = &parameters.limits;
     time_s(twist.linear.norm(), position).max(time_s(twist.angular.norm(), orientation)) + 0.055
+}
+
+/// Time in which a reference of this motion rests \[s\]: it releases a (|a|/J), by which v changes to v1 = v + a |a|/(2 J), and stops from v1
+/// (v1/A + A/J, or 2 sqrt(v1/J) if A is not reached). Near a bound, where it brakes at once, what is across v ends after 3.02 A/J.
+pub fn planned_stop_s(limits: &Limits, motion: &Motion) -> f64 {
+    let time_s = |v: &Vector3<f64>, a: &Vector3<f64>, of: &DerivativeLimits| {
+        let (ramp_s, release_s) = (of.acceleration / of.jerk, a.norm() / of.jerk);
+        let v1 = (v + a * (0.5 * release_s)).norm();
+        let straight_s = match v1 >= of.acceleration * ramp_s {
+            true => v1 / of.acceleration + ramp_s,
+            false => 2.0 * (v1 / of.jerk).sqrt(),
+        };
+        let is_straight = v.cross(a).norm() <= 1e-9 * v.norm() * of.acceleration;
+        release_s + straight_s + if is_straight { 0.0 } else { 3.02 * ramp_s }
+    };
+    let Motion { twist, acceleration, .. } = motion;
+    time_s(&twist.linear, &acceleration.linear, &limits.position).max(time_s(
+        &twist.angular,
+        &acceleration.angular,
+        &limits.orientation,
+    ))
 }
 
 impl Property {

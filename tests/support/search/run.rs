@@ -14,7 +14,7 @@ use nalgebra::Vector6;
 
 use super::genome::Genome;
 use super::messages::Channel;
-use super::property::{Moment, PROPERTIES, longest_stop_s};
+use super::property::{Moment, PROPERTIES, Stop, longest_stop_s, planned_stop_s};
 use super::scenario::Scenario;
 use crate::rig::{Rig, START_NS, STEP_S};
 
@@ -25,6 +25,8 @@ pub struct Outcome {
     pub worst: [f64; PROPERTIES.len()],
     /// Under control.
     pub cycles: u64,
+    /// Measurements under control, without and with rates.
+    pub measured: [u64; 2],
     /// Which faults were counted, the last of them.
     pub fault: DiagnosticCode,
     pub end_stops: u32,
@@ -85,8 +87,8 @@ pub fn run_with(
     requests.reverse();
     let mut frozen: Option<Measurement> = None;
     let mut before = Output::default();
-    let (mut without_s, mut faults) = (0.0, Faults::default());
-    let (mut worst, mut stopped) = ([f64::NEG_INFINITY; PROPERTIES.len()], None);
+    let (mut without_s, mut faults, mut measured) = (0.0, Faults::default(), [0; 2]);
+    let (mut worst, mut stopped) = ([f64::NEG_INFINITY; PROPERTIES.len()], None::<Stop>);
     while observed.time_s() < scenario.duration_s
         && observed.meter().impact_m_s.is_none()
         && !is_carried_out(&observed)
@@ -96,18 +98,25 @@ pub fn run_with(
         source.follow(&scenario, &observed, before.state);
         if let Some(request) = ask(&scenario, &mut observed, before.state, &mut requests, &mut without_s) {
             let is_stop = request == Request::Stop && before.state.has_control();
-            let longest_s = longest_stop_s(&observed.parameters, &observed.simulator().state().twist);
-            stopped = is_stop.then_some([observed.time_s(), longest_s]);
+            stopped = is_stop.then(|| Stop {
+                at_s: observed.time_s(),
+                longest_s: longest_stop_s(&observed.parameters, &observed.simulator().state().twist),
+                planned_s: before
+                    .reference
+                    .map(|motion| planned_stop_s(&observed.parameters.limits, &motion)),
+            });
         }
         let input = input(&scenario, &observed, &source, &mut channel, &mut frozen);
         let output = observed.cycle(&input);
+        if let Some(measurement) = input.measurement.filter(|_| output.state.has_control()) {
+            measured[usize::from(measurement.rate.is_some())] += 1;
+        }
         let policies_apart = twin.as_mut().and_then(|twin| twin.apart(&observed.controller, &input, &output));
         watch(&observed, &input, &output);
         faults.add(&before, &output);
         stopped = stopped.filter(|_| output.state.has_control());
-        let stop_s = stopped.map(|[at_s, longest_s]| [observed.time_s() - at_s, longest_s]);
-        let (rig, policy) = (&observed, genome.policy);
-        let moment = Moment { rig, before: &before, output: &output, stop_s, faults, policy, policies_apart };
+        let (rig, policy, stop) = (&observed, genome.policy, stopped);
+        let moment = Moment { rig, before: &before, output: &output, stop, faults, policy, policies_apart };
         for (worst, property) in worst.iter_mut().zip(&PROPERTIES) {
             let value = property.value(&moment);
             *worst = if value.is_nan() { f64::INFINITY } else { worst.max(value) };
@@ -117,6 +126,7 @@ pub fn run_with(
     Outcome {
         worst,
         cycles: observed.meter().cycles,
+        measured,
         fault: faults.last,
         end_stops: u32::from(observed.meter().impact_m_s.is_some()),
     }

@@ -14,8 +14,8 @@ pub struct Row {
     pub cycles: [u64; 2],
     pub runs: u64,
     pub end_stops: u64,
-    /// By world and sensors.
-    pub runs_of: [[u64; Sensors::ALL.len()]; World::ALL.len()],
+    /// Runs in which a property was judged, by world and sensors.
+    pub judged: [[[u64; PROPERTIES.len()]; Sensors::ALL.len()]; World::ALL.len()],
     /// Largest value of each property.
     pub worst: [f64; PROPERTIES.len()],
     /// Runs in which a property did not hold.
@@ -29,7 +29,7 @@ impl Row {
             cycles: [0; 2],
             runs: 0,
             end_stops: 0,
-            runs_of: Default::default(),
+            judged: [[[0; PROPERTIES.len()]; Sensors::ALL.len()]; World::ALL.len()],
             worst: [f64::NEG_INFINITY; PROPERTIES.len()],
             violations: [0; PROPERTIES.len()],
         }
