@@ -8,7 +8,7 @@ use hexad::control::signals::limits::{DerivativeLimits, Limits};
 use hexad::model::rigid::{Motion, Twist};
 use nalgebra::Vector3;
 
-use super::genome::{Genome, World};
+use super::genome::{Genome, World, name};
 use super::run::Faults;
 use crate::extremes::{Quantity, REFERENCE_ALLOWANCE};
 use crate::rig::Rig;
@@ -206,7 +206,7 @@ pub fn place(name: &str) -> usize {
 /// The table of docs/safety.md.
 pub fn table() -> String {
     let row = |property: &Property| {
-        let worlds: Vec<_> = property.worlds.iter().map(|world| world.name()).collect();
+        let worlds: Vec<_> = property.worlds.iter().map(name).collect();
         let frozen = if property.with_frozen_sensors { ", frozen sensors" } else { "" };
         format!("| {} | {} | {}{frozen} |\n", property.name, property.claim, worlds.join(", "))
     };
