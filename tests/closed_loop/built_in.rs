@@ -71,18 +71,20 @@ fn first_refusal(
     })
 }
 
+/// A machine whose drives have this multiple of the force that holds it at home.
+fn weak(name: &str, share: f64) -> Config {
+    let machine = with_force(name, 1e6).machine;
+    let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().hardest_held();
+    with_force(name, share * held)
+}
+
 /// An excitation uses what the drives can give: of weak drives no more than the supervision allows.
 #[test]
 fn certificate_an_excitation_of_weak_drives_is_followed() {
     let seen =
         [("motion_base", 7613.829462515296), ("motion_base", 1e4)].map(|(name, n)| with_force(name, n));
     let tilted = Config::load(&data("tilt36_weak", "toml")).unwrap();
-    let random = (0..60).map(|run: u32| {
-        let name = MACHINES[run as usize % 3];
-        let machine = with_force(name, 1e6).machine;
-        let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().hardest_held();
-        with_force(name, held * (1.2 + 0.03 * f64::from(run)))
-    });
+    let random = (0..60).map(|run| weak(MACHINES[run as usize % 3], 1.2 + 0.03 * f64::from(run)));
     let all: Vec<_> = seen.into_iter().chain([tilted]).chain(random).collect();
     let count = if Certificate::is_long() { all.len() } else { 1 };
     all.into_par_iter().take(count).for_each(|config| {
@@ -104,11 +106,6 @@ fn certificate_an_excitation_of_weak_drives_is_followed() {
 /// itself 7 of 240 end in 124, 2026-11-29: what is just followed with one phase is lost with another.)
 #[test]
 fn certificate_what_the_precheck_accepts_is_followed() {
-    let weak = |name: &str, share: f64| {
-        let machine = with_force(name, 1e6).machine;
-        let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().hardest_held();
-        with_force(name, share * held)
-    };
     let all = MACHINES.into_iter().flat_map(|name| [1.5, 2.0, 3.0, 100.0].map(|share| weak(name, share)));
     let all = all.flat_map(|config| BuiltInMotion::ALL.map(|motion| (config.clone(), motion)));
     cases(all, 7).into_par_iter().for_each(|(config, motion)| {

@@ -9,7 +9,6 @@ use hexad::messages::clock::monotonic_ns;
 
 use crate::support::machine::{PERIOD_NS, TIMEOUT_NS};
 use crate::support::operator;
-use crate::support::recorder::Recording;
 use crate::support::trio::{Trio, let_pass, valid_after};
 
 /// Longer than every timeout of the machine file.
@@ -42,16 +41,7 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
         let status = recording.statuses.last()?;
         (status.counters.skipped >= before.counters.skipped + LEAST_SKIPPED).then_some(())
     });
-    operator::clear_and_engage(&trio.machine);
-    let (_, recovered_ns) = let_pass(Duration::from_millis(500));
-    trio.moves_after(recovered_ns);
-    let recording = trio.finish();
-    let after = recording.statuses.last().expect("a status");
-    println!(
-        "daemon stopped for {PAUSE:?} at 1 kHz: {} skipped",
-        after.counters.skipped - before.counters.skipped
-    );
-    brakes_held_until_control_was_taken_anew(from_ns, DiagnosticCode::DaemonHeld, &recording);
+    brakes_held_until_control_was_taken_anew(trio, from_ns, DiagnosticCode::DaemonHeld);
 }
 
 /// As a host that takes the processors away: the platform moves on under the last forces. The daemon is back before the
@@ -99,26 +89,21 @@ fn pause_shortly(trio: &Trio) -> (Option<ForceMessage>, u64) {
 #[apply(beside_others)]
 fn a_paused_plant_recovers() {
     let trio = Trio::in_motion("paused-plant");
-    let before = trio.recorder.so_far().statuses.last().copied().expect("a status");
     trio.plant.signal("STOP");
     let (from_ns, _) = let_pass(PAUSE);
     trio.plant.signal("CONT");
     trio.daemon.says("fault: measurement lost");
-    operator::clear_and_engage(&trio.machine);
-    let (_, recovered_ns) = let_pass(Duration::from_millis(500));
-    trio.moves_after(recovered_ns);
-    let recording = trio.finish();
-    let after = recording.statuses.last().expect("a status");
-    println!(
-        "plant stopped for {PAUSE:?}: {} cycles of the daemon skipped",
-        after.counters.skipped - before.counters.skipped
-    );
-    brakes_held_until_control_was_taken_anew(from_ns, DiagnosticCode::MeasurementLost, &recording);
+    brakes_held_until_control_was_taken_anew(trio, from_ns, DiagnosticCode::MeasurementLost);
 }
 
 /// Whoever was away, the plant's brakes closed: the loop may not go on as if nothing had happened, but is in a
 /// fault until it is cleared and engaged from where the platform stands.
-fn brakes_held_until_control_was_taken_anew(from_ns: u64, code: DiagnosticCode, recording: &Recording) {
+fn brakes_held_until_control_was_taken_anew(trio: Trio, from_ns: u64, code: DiagnosticCode) {
+    operator::clear_and_engage(&trio.machine);
+    let (_, recovered_ns) = let_pass(Duration::from_millis(500));
+    trio.moves_after(recovered_ns);
+    let recording = trio.finish();
+    println!("after a pause of {PAUSE:?}: {:?}", recording.statuses.last().map(|status| status.counters));
     let after: Vec<_> = recording.forces.iter().filter(|force| force.release_ns > from_ns).collect();
     let let_go = after.iter().position(|force| force.valid == 0).expect("the daemon let go of the platform");
     let first = after[let_go];

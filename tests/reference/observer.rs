@@ -9,6 +9,7 @@ use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::Motion;
 use hexad::model::task::task_coordinates;
+use nalgebra::Vector3;
 
 /// Instants examined in each cycle.
 const INSTANTS: u64 = 4;
@@ -44,25 +45,20 @@ pub fn examine(
     for k in 1..=INSTANTS {
         let instant_ns = begin_ns + (end_ns - begin_ns) * k / INSTANTS;
         let now = if k == INSTANTS { *reference.motion() } else { reference.motion_at(instant_ns) };
-        for (names, limits, v, a, change) in [
+        for (names, limits, derivatives) in [
             (
                 ["velocity", "acceleration", "jerk"],
                 limits.position,
-                now.twist.linear,
-                now.acceleration.linear,
-                now.acceleration.linear - last.acceleration.linear,
+                (|it| [it.twist.linear, it.acceleration.linear]) as fn(&Motion) -> [Vector3<f64>; 2],
             ),
-            (
-                ["angular velocity", "angular acceleration", "angular jerk"],
-                limits.orientation,
-                now.twist.angular,
-                now.acceleration.angular,
-                now.acceleration.angular - last.acceleration.angular,
-            ),
+            (["angular velocity", "angular acceleration", "angular jerk"], limits.orientation, |it| {
+                [it.twist.angular, it.acceleration.angular]
+            }),
         ] {
+            let ([v, a], [_, before]) = (derivatives(&now), derivatives(&last));
             largest.add(names[0], v.norm() / limits.velocity);
             largest.add(names[1], a.norm() / limits.acceleration);
-            largest.add(names[2], change.norm() / (limits.jerk * step_s));
+            largest.add(names[2], (a - before).norm() / (limits.jerk * step_s));
         }
         let moved = last.pose.displacement_to(&now.pose).vector() / step_s;
         let mean = (last.twist.vector() + now.twist.vector()) * 0.5;

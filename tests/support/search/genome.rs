@@ -36,15 +36,6 @@ pub enum Sensors {
 impl Sensors {
     pub const ALL: [Self; 4] = [Self::Exact, Self::Lengths, Self::Mixed, Self::Frozen];
 
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Lengths => "lengths",
-            Self::Mixed => "mixed",
-            Self::Frozen => "frozen",
-        }
-    }
-
     /// Whether so many measurements without and with rates are what they send.
     pub fn have_sent(self, [without, with]: [u64; 2]) -> bool {
         let expected = match self {
@@ -75,20 +66,16 @@ pub enum World {
 
 impl World {
     pub const ALL: [Self; 2] = [Self::Model, Self::Unmodelled];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Model => "model",
-            Self::Unmodelled => "unmodelled",
-        }
-    }
 }
 
-pub fn policy_name(policy: ViolationPolicy) -> &'static str {
-    match policy {
-        ViolationPolicy::Stop => "stop",
-        ViolationPolicy::Limit => "limit",
-    }
+/// A variant as it is written.
+pub fn name(variant: impl fmt::Debug) -> String {
+    format!("{variant:?}").to_lowercase()
+}
+
+/// The variant with a name.
+fn named<T: Copy + fmt::Debug>(variants: &[T], written: &str) -> Option<T> {
+    variants.iter().copied().find(|variant| name(variant) == written)
 }
 
 /// What a run is made of.
@@ -192,16 +179,10 @@ impl Genome {
     pub fn parse(text: &str) -> Option<Self> {
         let lines = text.lines().map(|line| line.split('#').next().unwrap_or(""));
         let mut words = lines.flat_map(str::split_whitespace);
-        let name = words.next()?;
-        let machine = MACHINES.iter().position(|machine| *machine == name)?;
-        let name = words.next()?;
-        let policy = [ViolationPolicy::Stop, ViolationPolicy::Limit]
-            .into_iter()
-            .find(|policy| policy_name(*policy) == name)?;
-        let name = words.next()?;
-        let sensors = Sensors::ALL.into_iter().find(|sensors| sensors.name() == name)?;
-        let name = words.next()?;
-        let world = World::ALL.into_iter().find(|world| world.name() == name)?;
+        let machine = words.next().and_then(|name| MACHINES.iter().position(|machine| *machine == name))?;
+        let policy = named(&[ViolationPolicy::Stop, ViolationPolicy::Limit], words.next()?)?;
+        let sensors = named(&Sensors::ALL, words.next()?)?;
+        let world = named(&World::ALL, words.next()?)?;
         let gene = |word: &str| {
             let (name, value) = word.split_once('=')?;
             Some((name.to_owned(), value.parse().ok()?))
@@ -214,7 +195,7 @@ impl Genome {
 impl fmt::Display for Genome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { machine, policy, sensors, world, genes } = self;
-        write!(f, "{} {} {} {}", MACHINES[*machine], policy_name(*policy), sensors.name(), world.name())?;
+        write!(f, "{} {} {} {}", MACHINES[*machine], name(policy), name(sensors), name(world))?;
         genes
             .iter()
             .filter(|(_, value)| **value != 0.0)

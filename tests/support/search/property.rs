@@ -8,7 +8,7 @@ use hexad::control::signals::limits::{DerivativeLimits, Limits};
 use hexad::model::rigid::{Motion, Twist};
 use nalgebra::Vector3;
 
-use super::genome::{Genome, World};
+use super::genome::{Genome, World, name};
 use super::run::Faults;
 use crate::extremes::{Quantity, REFERENCE_ALLOWANCE};
 use crate::rig::Rig;
@@ -125,7 +125,7 @@ pub const PROPERTIES: [Property; 18] = [
     },
     Property {
         name: "reference stop",
-        claim: "the reference rests when the stop from its own v and a with A and J ends (3.02 A/J later where v and a are not in one line)",
+        claim: "the reference rests when the stop from its own v and a with A and J ends, or after 3.02 A/J (as much later where v and a are not in one line)",
         worlds: EVERYWHERE,
         with_frozen_sensors: true,
         judge: Judge::Cycle(1.0 + REFERENCE_ALLOWANCE, |moment| {
@@ -152,7 +152,8 @@ pub fn longest_stop_s(parameters: &Parameters, twist: &Twist) -> f64 {
 }
 
 /// Time in which a reference of this motion rests \[s\]: it releases a (|a|/J), by which v changes to v1 = v + a |a|/(2 J), and stops from v1
-/// (v1/A + A/J, or 2 sqrt(v1/J) if A is not reached). Near a bound, where it brakes at once, what is across v ends after 3.02 A/J.
+/// (v1/A + A/J, or 2 sqrt(v1/J) if A is not reached). Near a bound it brakes at once, or does so already: what is across v ends after
+/// 3.02 A/J however small it is, and alone is in one line, too.
 pub fn planned_stop_s(limits: &Limits, motion: &Motion) -> f64 {
     let time_s = |v: &Vector3<f64>, a: &Vector3<f64>, of: &DerivativeLimits| {
         let (ramp_s, release_s) = (of.acceleration / of.jerk, a.norm() / of.jerk);
@@ -162,7 +163,8 @@ pub fn planned_stop_s(limits: &Limits, motion: &Motion) -> f64 {
             false => 2.0 * (v1 / of.jerk).sqrt(),
         };
         let is_straight = v.cross(a).norm() <= 1e-9 * v.norm() * of.acceleration;
-        release_s + straight_s + if is_straight { 0.0 } else { 3.02 * ramp_s }
+        let (stop_s, across_s) = (release_s + straight_s, 3.02 * ramp_s);
+        if is_straight { stop_s.max(across_s) } else { stop_s + across_s }
     };
     let Motion { twist, acceleration, .. } = motion;
     time_s(&twist.linear, &acceleration.linear, &limits.position).max(time_s(
@@ -206,7 +208,7 @@ pub fn place(name: &str) -> usize {
 /// The table of docs/safety.md.
 pub fn table() -> String {
     let row = |property: &Property| {
-        let worlds: Vec<_> = property.worlds.iter().map(|world| world.name()).collect();
+        let worlds: Vec<_> = property.worlds.iter().map(name).collect();
         let frozen = if property.with_frozen_sensors { ", frozen sensors" } else { "" };
         format!("| {} | {} | {}{frozen} |\n", property.name, property.claim, worlds.join(", "))
     };
