@@ -70,7 +70,7 @@ impl ReplayArguments {
         print(description(&recording, &summary, &replay, other.as_ref().unwrap_or(&recorded)))?;
         if replay.compared == 0 {
             return Err(Failure::after_start(format_args!(
-                "no cycle could be compared: the memory of the controller in the recording is that of hexad {}, and this is \
+                "no cycle could be compared: the recording has the controller's memory of hexad {}, and this is \
                  hexad {VERSION}; use that version",
                 recorded_version(&info)
             )));
@@ -79,7 +79,7 @@ impl ReplayArguments {
             && replay.is_rounding(recorded.deployment.realtime.period_s());
         if replay.different > 0 && other.is_none() && !is_tolerated {
             return Err(Failure::after_start(format_args!(
-                "{} of the cycles differ: the outputs of hexad {VERSION} are not those of the recording, which is of hexad {}",
+                "{} of the cycles differ: hexad {VERSION} has other outputs than hexad {}, which made the recording",
                 replay.different,
                 recorded_version(&info)
             )));

@@ -42,7 +42,7 @@ crate::named! {
         Sines => "sines",
         /// A circle at constant orientation.
         Circle => "circle",
-        /// A spatial curve like that of the paper's section 8.
+        /// A spatial curve, as in section 8 of the paper.
         // The paper's own curve is only in a figure; this one replaces it.
         Paper => "paper",
     }

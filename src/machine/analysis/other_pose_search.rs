@@ -1,8 +1,8 @@
 //! Ambiguous starts: rest poses of the usable region whose leg lengths another permitted pose has, too.
 //!
 //! A random walk from home visits the region: a step turns or shifts the platform within an interval, which shrinks until the pose is
-//! usable (R. M. Neal, Slice sampling, 2003). [`super::assembly_proof`] decides each pose; poses in between are not searched. The poses are the same in every run, and a longer search begins with
-//! those of a shorter one.
+//! usable (R. M. Neal, Slice sampling, 2003). [`super::assembly_proof`] decides each pose; poses in between are not searched. The poses are the
+//! same in every run, and a longer search begins with the poses of a shorter one.
 
 use core::f64::consts::PI;
 use core::fmt;

@@ -74,7 +74,7 @@ pub fn run(
         let _ = writeln!(text, "{}", path.display());
     }
     print(text)?;
-    survey.doubt().map_or(Ok(()), |doubt| Err(Failure::after_start(doubt)))
+    survey.warning().map_or(Ok(()), |warning| Err(Failure::after_start(warning)))
 }
 
 fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived> {

@@ -200,10 +200,10 @@ impl Ride<'_> {
 
     /// Examines a pose of the stream.
     fn survey(&mut self, Arrived { arrival_ns, x, .. }: &Arrived) {
-        let was_doubtful = self.survey.doubt().is_some();
+        let has_warned = self.survey.warning().is_some();
         self.survey.add(self.constants, *arrival_ns, x);
-        if let Some(doubt) = self.survey.doubt().filter(|_| !was_doubtful) {
-            warn!("{doubt}");
+        if let Some(warning) = self.survey.warning().filter(|_| !has_warned) {
+            warn!("{warning}");
         }
     }
 
@@ -222,11 +222,11 @@ impl Ride<'_> {
 
     /// Describes phase and stream to the operator. Returns what the operator, who has seen this phase, wants.
     fn describe(&self, is_paused: bool) -> Option<RideOrder> {
-        let doubt = self.survey.doubt();
-        let phase = self.phase.shown(is_paused, doubt.is_some());
+        let warning = self.survey.warning();
+        let phase = self.phase.shown(is_paused, warning.is_some());
         self.source.feed.describe(phase, || {
-            let doubt = doubt.map_or_else(String::new, |doubt| format!("{doubt}; "));
-            doubt + &self.receiver.description()
+            let warning = warning.map_or_else(String::new, |warning| format!("{warning}; "));
+            warning + &self.receiver.description()
         })
     }
 

@@ -82,7 +82,7 @@ impl StreamSurvey {
     }
 
     /// Why the units of the stream are hardly those of its format.
-    pub fn doubt(&self) -> Option<String> {
+    pub fn warning(&self) -> Option<String> {
         let share = self.outside / self.poses.max(1.0);
         let [way, angle] = [self.way, self.angle].map(|moved| moved / self.time_s.max(LEAST_S));
         let outside = self.bound.filter(|_| share > MAX_OUTSIDE && self.poses > LEAST_POSES).map(|bound| {
