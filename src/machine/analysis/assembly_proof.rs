@@ -299,3 +299,6 @@ impl<'a> Legs<'a> {
 fn norms(columns: &Matrix3x6<f64>) -> Vector6<f64> {
     Vector6::from_iterator(columns.column_iter().map(|column| column.norm()))
 }
+
+#[cfg(test)]
+mod tests;
