@@ -32,7 +32,7 @@ const FIRST_HALF_EDGE_RAD: f64 = 0.15;
 const LAST_HALF_EDGE_RAD: f64 = 3e-4;
 /// Of the moment of the joints, as a share of the largest: below it rounding decides what the linear equations give.
 const LEAST_EIGENVALUE: f64 = 1e-9;
-/// Cells of one proof: a second.
+/// Cells of one proof: three seconds.
 const MAX_CELLS: usize = 1 << 20;
 /// Steps by which Newton's operator makes a region smaller.
 const MAX_NEWTON_STEPS: usize = 8;
