@@ -207,7 +207,9 @@ fn every_folder_uses_only_folders_above_it() {
         for file in files_of(folder) {
             for used in Uses::of(&fs::read_to_string(&file).unwrap()).folders(folder.0) {
                 seen += 1;
-                let stands_above = FOLDERS[..=place].iter().any(|(name, _)| *name == used);
+                // Tests may read machine files: nothing of them is in the product.
+                let stands_above = FOLDERS[..=place].iter().any(|(name, _)| *name == used)
+                    || used == "config" && file.ends_with("tests.rs");
                 let why = forbidden.filter(|(_, names, _)| names.contains(&used)).map_or("", |(.., why)| why);
                 if !stands_above || !why.is_empty() {
                     wrong.push(format!("{} uses {used}: {why}", file.display()));
