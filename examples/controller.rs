@@ -27,10 +27,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for now_ns in (1..3000).map(|cycle| cycle * parameters.period_ns) {
         let t = now_ns as f64 * 1e-9;
         let legs = platform.leg_motion();
-        let (length, rate) = (legs.length, Some(legs.rate));
+        let (length, rate) = (legs.length_m, Some(legs.rate_m_s));
         let output = controller.step(&Input {
             release_ns: now_ns,
-            measurement: Some(Measurement { time_ns: now_ns, length, rate, ..Measurement::default() }),
+            measurement: Some(Measurement { time_ns: now_ns, length_m: length, rate_m_s: rate, ..Measurement::default() }),
             setpoint: Some(Setpoint::motion(now_ns, straight_move(&home, &top, &rise(t - 1.0, 1.0)))),
             request: Some(OperatorRequest {
                 request: Request::Engage,
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             state = output.state;
         }
         platform.advance(delay_s, force.as_ref());
-        force = output.state.has_control().then_some(output.force);
+        force = output.state.has_control().then_some(output.command_n);
         platform.advance(period_s - delay_s, force.as_ref());
     }
     Ok(())

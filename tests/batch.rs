@@ -112,7 +112,7 @@ fn poses_agree_with_one_pose_alone() {
             let there: Vec<_> = motions(name).iter().map(|motion| motion.pose).collect();
             let start = |pose: &Pose| {
                 let mut step = |scale: f64| Vector3::from_fn(|_, _| scale * random.signed());
-                pose.displaced(&Twist { angular: step(size), linear: step(size * joints.radius) })
+                pose.displaced(&Twist { angular: step(size), linear: step(size * joints.radius_m) })
             };
             let starts: Vec<_> = there.iter().map(start).collect();
             let lengths: Vec<_> = there.iter().map(|pose| leg_lengths(&machine, pose)).collect();

@@ -46,8 +46,8 @@ fn an_excitation_keeps_every_limit_of_the_machine() {
         for (t, state) in samples(&excitation, 0.01) {
             let (motion, place) = (state.motion(), format!("{name} at {t}"));
             let legs = leg_motion(machine, &motion);
-            assert!(legs.length.iter().all(|length| actuator.contains(*length)), "{place}");
-            assert!(legs.rate.iter().all(|rate| rate.abs() < actuator.max_rate), "{place}");
+            assert!(legs.length_m.iter().all(|length| actuator.contains(*length)), "{place}");
+            assert!(legs.rate_m_s.iter().all(|rate| rate.abs() < actuator.max_rate_m_s), "{place}");
             let force = inverse_dynamics::<Exact>(machine, &motion).unwrap();
             assert!(force.iter().all(|force| force.abs() < actuator.available_force()), "{place}: {force:?}");
         }
@@ -62,7 +62,7 @@ fn machines_of_every_size_are_excited() {
     for name in ["mirror_unknown_friction", "piezo", "hobby", "telescope_m2", "plate_3m"] {
         let config = Config::load(format!("tests/data/{name}.toml").as_ref()).unwrap();
         let actuator = &config.machine.actuator;
-        let stroke = (actuator.max_length - actuator.min_length).min(actuator.max_rate * 1.0);
+        let stroke = (actuator.max_length_m - actuator.min_length_m).min(actuator.max_rate_m_s * 1.0);
         let reach = reach(&config, &excitation(&config, 1, 1.0));
         println!("{name}: {reach:.1e} of a stroke, or of a second at the largest rate, {stroke:.1e} m");
         assert!(reach > 0.02 * stroke, "{name}: {reach} m or rad");

@@ -26,7 +26,7 @@ fn run(truth: &Machine, series: &Series, seconds: f64, noise: f64, load: Load, r
     let samples = (0..(seconds / 0.005) as u32).map(sample).map(|(time_s, motion, command)| MotionSample {
         time_s,
         motion,
-        command: command.map(|force| force + noise * random.gaussian()),
+        command_n: command.map(|force| force + noise * random.gaussian()),
     });
     Run { samples: samples.collect(), load }
 }
@@ -40,12 +40,12 @@ fn parameters_are_found_within_their_deviations() {
     {
         let file = machine(name);
         let (truth, series) = (drawn(&file, &mut random), Series::new(&file, share, &mut random));
-        let noise = 1e-3 * file.actuator.max_force;
-        let (mass, at) = (0.15 * file.platform.mass, [0.3, -0.2, 0.8].map(|x| x * file.joints.radius));
+        let noise = 1e-3 * file.actuator.max_force_n;
+        let (mass, at) = (0.15 * file.platform.mass_kg, [0.3, -0.2, 0.8].map(|x| x * file.joints.radius_m));
         let with_weight = loaded(&truth, mass, Vector3::from(at));
         let runs = [
             run(&truth, &series, 60.0, noise, Load::Empty, &mut random),
-            run(&with_weight, &series, 60.0, noise, Load::Known { mass, at }, &mut random),
+            run(&with_weight, &series, 60.0, noise, Load::Known { mass_kg: mass, at_m: at }, &mut random),
         ];
         let unused =
             [run(&truth, &Series::new(&file, 1.0, &mut random), 10.0, 0.0, Load::Empty, &mut random)];
@@ -76,11 +76,11 @@ fn gravity_that_is_off_is_found_and_contained() {
     let file = machine("motion_base");
     let (exact, series) = (drawn(&file, &mut random), Series::new(&file, 1.0, &mut random));
     let mut tilted = exact.clone();
-    tilted.gravity = Rotation3::new(Vector3::new(0.01, 0.0145, 0.0)) * exact.gravity;
+    tilted.gravity_m_s2 = Rotation3::new(Vector3::new(0.01, 0.0145, 0.0)) * exact.gravity_m_s2;
     for (truth, is_exact) in [(&exact, true), (&tilted, false)] {
         let runs = [run(truth, &series, 30.0, 2.0, Load::Empty, &mut random)];
         let mut found = identify(&file, &runs, false).unwrap();
-        let friction = |machine: &Machine, _: &_| machine.actuator.viscous_friction[0];
+        let friction = |machine: &Machine, _: &_| machine.actuator.viscous_friction_n_s_m[0];
         let before = found.estimate(friction).deviation;
         // A delay that is known to 0.1 ms only matters to friction.
         let examination = found.examine(&runs, 1e-4).unwrap();
@@ -101,7 +101,7 @@ fn gravity_that_is_off_is_found_and_contained() {
         );
         let after = found.estimate(friction);
         assert!(after.deviation > before, "{after:?} {before}");
-        let off = after.value - truth.actuator.viscous_friction[0];
+        let off = after.value - truth.actuator.viscous_friction_n_s_m[0];
         assert!(off.abs() < 4.0 * after.deviation, "{off} {after:?}");
     }
 }
@@ -115,7 +115,7 @@ fn without_a_known_weight_masses_are_relative() {
     truth.actuator.force_scale = [1.1; 6];
     let runs = [run(&truth, &series, 60.0, 1.0, Load::Empty, &mut random)];
     let found = identify(&file, &runs, false).unwrap();
-    let mass = |machine: &Machine| machine.platform.mass + 6.0 * machine.rod.mass;
+    let mass = |machine: &Machine| machine.platform.mass_kg + 6.0 * machine.rod.mass_kg;
     assert!((mass(&found.machine) * 1.1 / mass(&truth) - 1.0).abs() < 1e-3, "{}", mass(&found.machine));
     assert!(found.machine.actuator.force_scale.iter().all(|scale| (scale - 1.0).abs() < 1e-3));
     assert!(found.base_parameters.is_none(), "the equations alone allow zero");
@@ -127,15 +127,15 @@ fn a_flat_plate_may_be_thick() {
     let mut random = Random::new(11);
     let file = machine("fried2008");
     let mut truth = file.clone();
-    truth.platform.mass = 2.5;
-    truth.platform.center_of_mass = Vector3::new(0.01, 0.02, -0.015);
+    truth.platform.mass_kg = 2.5;
+    truth.platform.center_of_mass_m = Vector3::new(0.01, 0.02, -0.015);
     truth.platform.inertia = Matrix3::from_diagonal(&Vector3::new(0.32, 0.17, 0.2));
     let series = Series::new(&file, 1.0, &mut random);
     let (mass, at) = (0.5, [0.0, 0.0, 0.1]);
     let with_weight = loaded(&truth, mass, Vector3::from(at));
     let runs = [
         run(&truth, &series, 30.0, 0.1, Load::Empty, &mut random),
-        run(&with_weight, &series, 30.0, 0.1, Load::Known { mass, at }, &mut random),
+        run(&with_weight, &series, 30.0, 0.1, Load::Known { mass_kg: mass, at_m: at }, &mut random),
     ];
     let found = identify(&file, &runs, false).unwrap();
     assert!(worst_error(&found, &truth) < 4.5);

@@ -143,18 +143,18 @@ fn lumped_mass(machine: &Machine) -> f64 {
     let Machine { cylinder, rod, .. } = machine;
     let home = TaskState::at_rest(machine.home).motion().pose;
     let length = leg_lengths(machine, &home).iter().sum::<f64>() / 6.0;
-    (cylinder.mass * cylinder.center_of_mass + rod.mass * (length - rod.center_of_mass)) / length
+    (cylinder.mass_kg * cylinder.center_of_mass_m + rod.mass_kg * (length - rod.center_of_mass_m)) / length
 }
 
 fn nothing() -> Link {
-    let transverse_inertia = TransverseInertia { constant: 0.0, quadratic: 0.0, reference_length: 0.0 };
-    Link { mass: 0.0, center_of_mass: 0.0, axial_inertia: 0.0, transverse_inertia }
+    let transverse_inertia = TransverseInertia { constant_kg_m2: 0.0, quadratic_kg: 0.0, reference_length_m: 0.0 };
+    Link { mass_kg: 0.0, center_of_mass_m: 0.0, axial_inertia_kg_m2: 0.0, transverse_inertia }
 }
 
 /// A body and points of this mass at the `B_i`, by Steiner's theorem.
 fn with_points(machine: &Machine, mass: f64) -> Platform {
     let points = Legs::of(machine).platform.map(|b| (mass, b, Matrix3::zeros()));
-    let Platform { mass, center_of_mass, inertia } = machine.platform;
+    let Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia } = machine.platform;
     let parts: Vec<_> = [(mass, center_of_mass, inertia)].into_iter().chain(points).collect();
     let mass: f64 = parts.iter().map(|part| part.0).sum();
     let center_of_mass: Vector3<f64> =
@@ -163,7 +163,7 @@ fn with_points(machine: &Machine, mass: f64) -> Platform {
         let r: Vector3<f64> = at - center_of_mass;
         own + (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *mass
     };
-    Platform { mass, center_of_mass, inertia: parts.iter().map(about_center).sum() }
+    Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia: parts.iter().map(about_center).sum() }
 }
 
 /// The simple fidelities are the exact model of another machine.

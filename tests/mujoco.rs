@@ -88,7 +88,7 @@ fn differences(machine: &Machine, motions: &[Motion], found: &[[f64; LEGS]]) -> 
 
 /// MuJoCo's Coulomb friction is a constraint and no force of a motion.
 fn without_dry_friction(mut machine: Machine) -> Machine {
-    machine.actuator.coulomb_friction = [0.0; 6];
+    machine.actuator.coulomb_friction_n = [0.0; 6];
     machine
 }
 
@@ -115,11 +115,11 @@ fn mujoco_computes_the_same_forces_from_the_urdf() {
         let home = TaskState::at_rest(machine.home).motion().pose;
         let length = leg_lengths(&machine, &home)[0];
         for Link { transverse_inertia: inertia, .. } in [&mut machine.cylinder, &mut machine.rod] {
-            inertia.constant += inertia.quadratic * (length - inertia.reference_length).powi(2);
-            inertia.quadratic = 0.0;
+            inertia.constant_kg_m2 += inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2);
+            inertia.quadratic_kg = 0.0;
         }
-        machine.gravity = Vector3::new(0.0, 0.0, -9.81);
-        machine.actuator.reflected_mass = 0.0;
+        machine.gravity_m_s2 = Vector3::new(0.0, 0.0, -9.81);
+        machine.actuator.reflected_mass_kg = 0.0;
         let found = forces_by_mujoco(name, "urdf", &exported(name, "urdf"));
         differences(&machine, &motions(name), &found).assert_within(1e-10, &format!("{name} URDF, forces"));
     }
@@ -161,12 +161,12 @@ const POSES: usize = 8;
 /// Poses within the stroke, up to a tenth of a radian and of the platform's radius from home.
 fn poses(machine: &Machine) -> Vec<[f64; 6]> {
     let mut random = Random::new(7);
-    let stroke = machine.actuator.min_length..machine.actuator.max_length;
+    let stroke = machine.actuator.min_length_m..machine.actuator.max_length_m;
     let mut poses = Vec::new();
     while poses.len() < POSES {
         let mut x = machine.home;
         for (k, value) in x.iter_mut().enumerate() {
-            let reach = if k < 3 { 0.1 } else { 0.1 * machine.joints.radius };
+            let reach = if k < 3 { 0.1 } else { 0.1 * machine.joints.radius_m };
             *value += reach * (2.0 * random.uniform() - 1.0);
         }
         let lengths = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);

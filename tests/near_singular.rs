@@ -55,13 +55,13 @@ impl Compared {
         let (machine, motion) = (scene.model.machine(), &scene.motion);
         let load = scene.model.load_of::<Exact>(motion);
         let n = load.leg_wrenches;
-        let exact = reference::solve(&n, &load.wrench) + load.axial_forces;
+        let exact = reference::solve(&n, &load.wrench) + load.axial_forces_n;
         let ours = scene.model.forces::<Exact>(motion).map(Vector6::from);
-        let lu = n.lu().solve(&load.wrench).map(|x| x + load.axial_forces);
+        let lu = n.lu().solve(&load.wrench).map(|x| x + load.axial_forces_n);
         self.forces.add([ours, lu], &exact);
 
         // Angles count as lengths at the platform's radius.
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         let scaled = |v: Vector6<f64>| v.component_mul(&Vector6::new(r, r, r, 1.0, 1.0, 1.0));
         let exact = scaled(reference::solve(&n.transpose(), &scene.rates));
         let ours = twist_from_rates(machine, &motion.pose, &scene.rates.into());
@@ -83,7 +83,7 @@ fn determinants(machine: &Machine, pose: &Pose) -> (f64, f64) {
     let n = leg_wrenches(machine, pose);
     let legs = machine.joints.triples.pack(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]).0;
     let d_a = Matrix3::from_fn(|i, j| n[(i + 3, legs[j] as usize)]).determinant();
-    (d_a, n.determinant() / d_a / machine.joints.radius.powi(3))
+    (d_a, n.determinant() / d_a / machine.joints.radius_m.powi(3))
 }
 
 #[test]

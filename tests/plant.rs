@@ -41,11 +41,11 @@ fn hardware(machine: &Machine, wanted: &Imperfections) -> Hardware {
 fn everything() -> Imperfections {
     Imperfections {
         seed: 5,
-        drive: DriveErrors { bandwidth_hz: Some(80.0), force_step: 5.0, dead_time_ns: 1_500_000 },
-        friction: Friction { viscous: 200.0, coulomb: 150.0, stiction: 100.0, ..Friction::default() },
-        leg: Some(ElasticLeg { stiffness: 5e7, damping: 1e4, backlash: 2e-5 }),
-        sensor: SensorErrors { length_step: 1e-6, rate_step: 1e-4, length_noise: 2e-6, rate_noise: 1e-4 },
-        build: BuildErrors { payload: 100.0, payload_at: Vector3::new(0.1, 0.0, 0.5), joints: 1e-4 },
+        drive: DriveErrors { bandwidth_hz: Some(80.0), force_step_n: 5.0, dead_time_ns: 1_500_000 },
+        friction: Friction { viscous_n_s_m: 200.0, coulomb_n: 150.0, stiction_n: 100.0, ..Friction::default() },
+        leg: Some(ElasticLeg { stiffness_n_per_m: 5e7, damping_n_s_m: 1e4, backlash_m: 2e-5 }),
+        sensor: SensorErrors { length_step_m: 1e-6, rate_step_m_s: 1e-4, length_noise_m: 2e-6, rate_noise_m_s: 1e-4 },
+        build: BuildErrors { payload_kg: 100.0, payload_at_m: Vector3::new(0.1, 0.0, 0.5), joint_deviation_m: 1e-4 },
         external: ExternalWrench {
             wrench: Wrench { torque: Vector3::new(50.0, 0.0, 0.0), force: Vector3::new(0.0, 100.0, 0.0) },
             frequency_hz: 2.0,
@@ -62,7 +62,7 @@ fn holding(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
 /// Drives that only push.
 fn without_drives(mut machine: Machine) -> Machine {
     let actuator = &mut machine.actuator;
-    (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) =
+    (actuator.reflected_mass_kg, actuator.viscous_friction_n_s_m, actuator.coulomb_friction_n) =
         (0.0, [0.0; 6], [0.0; 6]);
     machine
 }
@@ -81,7 +81,7 @@ fn integrate(
     let start = PlantState { platform: *start, drives: DriveStates::default() };
     let accelerations = |state: &PlantState, _| {
         let platform = dynamics.acceleration(&state.platform.pose, &state.platform.twist, force)?;
-        Some(Accelerations { platform, drives: Vector6::zeros() })
+        Some(Accelerations { platform, drives_m_s2: Vector6::zeros() })
     };
     Some(hexad::plant::integrator::integrate(&start, step, accelerations)?.platform)
 }
@@ -90,7 +90,7 @@ fn integrate(
 fn legs(machine: &Machine, state: &BodyState) -> ([f64; LEGS], [f64; LEGS]) {
     let motion = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
     let legs = leg_motion(machine, &motion);
-    (legs.length, legs.rate)
+    (legs.length_m, legs.rate_m_s)
 }
 
 /// Forces that carry the platform and shake it about home: six sines of up to `size` radii and as many
@@ -102,7 +102,7 @@ fn shaking(machine: &Machine, state: &BodyState, t: f64, size: f64, hertz: f64) 
     let Twist { angular, linear } = state.twist;
     let acceleration = Acceleration {
         angular: (back.angular + Vector3::new(sine(0.0), sine(1.0), sine(2.0))) * (w * w) - angular * w,
-        linear: (back.linear + Vector3::new(sine(3.0), sine(4.0), sine(5.0)) * machine.joints.radius)
+        linear: (back.linear + Vector3::new(sine(3.0), sine(4.0), sine(5.0)) * machine.joints.radius_m)
             * (w * w)
             - linear * w,
     };

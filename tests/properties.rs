@@ -60,10 +60,10 @@ fn disturbed(legs: &[Vector3<f64>; LEGS], by: &[Vector3<f64>; LEGS], size: f64) 
 
 fn heavier(link: &Link, mass: f64, axial: f64, quadratic: f64) -> Link {
     let mut link = link.clone();
-    link.mass *= mass;
-    link.center_of_mass *= 0.5 + 0.5 * mass;
-    link.axial_inertia = axial * link.transverse_inertia.constant;
-    link.transverse_inertia.quadratic += quadratic * link.mass;
+    link.mass_kg *= mass;
+    link.center_of_mass_m *= 0.5 + 0.5 * mass;
+    link.axial_inertia_kg_m2 = axial * link.transverse_inertia.constant_kg_m2;
+    link.transverse_inertia.quadratic_kg += quadratic * link.mass_kg;
     link
 }
 
@@ -78,7 +78,7 @@ fn any_machine() -> impl Strategy<Value = Machine> {
     (0..MACHINES.len(), (legs(), legs(), axes), factors, links, drive, (vector3(), direction())).prop_map(
         |(which, (base, platform, axes), [body, cylinder, rod], links, drive, (offset, gravity))| {
             let mut machine = SOUND[which].clone();
-            let radius = machine.joints.radius;
+            let radius = machine.joints.radius_m;
             let legs = Legs::of(&machine);
             let legs = Legs {
                 base: disturbed(&legs.base, &base, 0.05 * radius),
@@ -86,16 +86,16 @@ fn any_machine() -> impl Strategy<Value = Machine> {
                 universal_axis: axes,
             };
             machine.joints = legs.joints(&machine.home);
-            machine.gravity = gravity * 9.81;
-            machine.platform.mass *= body;
-            machine.platform.center_of_mass += offset * (0.2 * radius);
+            machine.gravity_m_s2 = gravity * 9.81;
+            machine.platform.mass_kg *= body;
+            machine.platform.center_of_mass_m += offset * (0.2 * radius);
             machine.cylinder = heavier(&machine.cylinder, cylinder, links[0], links[2]);
             machine.rod = heavier(&machine.rod, rod, links[1], links[3]);
-            let mass = machine.platform.mass;
-            machine.actuator.reflected_mass = 0.3 * mass * drive[0];
-            machine.actuator.viscous_friction =
+            let mass = machine.platform.mass_kg;
+            machine.actuator.reflected_mass_kg = 0.3 * mass * drive[0];
+            machine.actuator.viscous_friction_n_s_m =
                 core::array::from_fn(|leg| mass * drive[1] * (1.0 + 0.1 * leg as f64));
-            machine.actuator.coulomb_friction =
+            machine.actuator.coulomb_friction_n =
                 core::array::from_fn(|leg| mass * drive[2] * (1.0 - 0.1 * leg as f64));
             machine
         },
@@ -104,7 +104,7 @@ fn any_machine() -> impl Strategy<Value = Machine> {
 
 /// A state near home: 10 degrees and 15 % of the radius away, at up to 2 rad/s and 20 rad/s^2 per axis.
 fn state_near_home(machine: &Machine, [x, xd, xdd]: &[Vector6<f64>; 3]) -> TaskState {
-    let r = machine.joints.radius;
+    let r = machine.joints.radius_m;
     let size = |angle: f64, share: f64| {
         let length = share * r;
         Vector6::new(angle, angle, angle, length, length, length)

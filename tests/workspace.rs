@@ -29,7 +29,7 @@ fn directions(k: u32) -> [Vector3<f64>; 2] {
 
 /// X beside home: up to so many radians and radii.
 fn beside_home(machine: &Machine, k: u32, size: f64) -> [f64; 6] {
-    let shift = size * machine.joints.radius;
+    let shift = size * machine.joints.radius_m;
     let scales = [size, size, size, shift, shift, shift];
     let offsets = numbers(k);
     core::array::from_fn(|axis| machine.home[axis] + scales[axis] * offsets[axis])

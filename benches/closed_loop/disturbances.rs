@@ -58,21 +58,21 @@ const SWEEPS: [Sweep; 4] = [
 fn payload(percent: f64) -> Imperfections {
     let body = hexad_support::deployed(MACHINE).machine.platform;
     let mut imperfections = Imperfections::default();
-    imperfections.build.payload = 0.01 * percent * body.mass;
-    imperfections.build.payload_at = body.center_of_mass;
+    imperfections.build.payload_kg = 0.01 * percent * body.mass_kg;
+    imperfections.build.payload_at_m = body.center_of_mass_m;
     imperfections
 }
 
 fn friction(newtons: f64) -> Imperfections {
     let mut imperfections = Imperfections::default();
-    imperfections.friction.coulomb = newtons;
+    imperfections.friction.coulomb_n = newtons;
     imperfections
 }
 
 fn noise(micrometres: f64) -> Imperfections {
     let mut imperfections = Imperfections { seed: 1, ..Imperfections::default() };
-    imperfections.sensor.length_noise = 1e-6 * micrometres;
-    imperfections.sensor.rate_noise = 1e-6 * micrometres * RATE_NOISE;
+    imperfections.sensor.length_noise_m = 1e-6 * micrometres;
+    imperfections.sensor.rate_noise_m_s = 1e-6 * micrometres * RATE_NOISE;
     imperfections
 }
 

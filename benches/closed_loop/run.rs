@@ -113,8 +113,8 @@ impl Run {
                 setpoint: Some(Setpoint::motion(now_ns, task)),
                 measurement: Some(Measurement {
                     time_ns: now_ns,
-                    length,
-                    rate: Some(rate),
+                    length_m: length,
+                    rate_m_s: Some(rate),
                     ..Measurement::default()
                 }),
                 request: (cycle > 0).then_some(OperatorRequest {
@@ -129,7 +129,7 @@ impl Run {
                 return Outcome { lost: output.diagnostic.code, ..outcome };
             }
             hardware.advance(delay_ns, force);
-            force = output.state.has_control().then_some(output.force);
+            force = output.state.has_control().then_some(output.command_n);
             hardware.advance(period_ns - delay_ns, force);
         }
         outcome

@@ -102,8 +102,8 @@ fn at(machine: &Machine, path: &FittedMotion, time_ns: u64) -> (SetpointMessage,
         ..SetpointMessage::default()
     };
     let measured = MeasuredMessage {
-        length_m: legs.length,
-        length_rate_m_s: legs.rate,
+        length_m: legs.length_m,
+        length_rate_m_s: legs.rate_m_s,
         rates_valid: 1,
         ..MeasuredMessage::default()
     };

@@ -73,7 +73,7 @@ impl Fleet {
         let row = |index: usize| {
             let state = scene.at(BEGIN_S + index as f64 * period_s);
             let legs = leg_motion(machine, &state.motion());
-            (state, legs.length, legs.rate)
+            (state, legs.length_m, legs.rate_m_s)
         };
         let controller = Controller::new(machine, parameters(machine, &config.deployment, Fidelity::Exact));
         let stride = (WARM_UP_STEP_S / period_s) as usize;
@@ -110,8 +110,8 @@ impl Fleet {
                 setpoint: Some(Setpoint::motion(release_ns, *task)),
                 measurement: Some(Measurement {
                     time_ns: release_ns,
-                    length: *length,
-                    rate: Some(*rate),
+                    length_m: *length,
+                    rate_m_s: Some(*rate),
                     ..Measurement::default()
                 }),
                 request,

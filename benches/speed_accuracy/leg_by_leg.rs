@@ -35,7 +35,7 @@ impl LegByLeg {
         let [bases, platforms, axes] = [&joints.base, &joints.platform, &joints.universal_axis]
             .map(|lanes| joints.triples.unpack_vectors(lanes));
         let mut friction =
-            machine.actuator.viscous_friction.into_iter().zip(machine.actuator.coulomb_friction);
+            machine.actuator.viscous_friction_n_s_m.into_iter().zip(machine.actuator.coulomb_friction_n);
         let mut places = bases.into_iter().zip(platforms).zip(axes);
         let legs = core::array::from_fn(|_| {
             let ((base, platform), universal_axis) = places.next().unwrap_or_default();
@@ -75,9 +75,9 @@ impl LegByLeg {
     fn platform_wrench(&self, motion: &Motion) -> [Vector3<f64>; 2] {
         let (rotation, omega) = (&motion.pose.rotation, &motion.twist.angular);
         let (body, omega_rate) = (&self.machine.platform, &motion.acceleration.angular);
-        let c = rotation * body.center_of_mass;
+        let c = rotation * body.center_of_mass_m;
         let accel = motion.acceleration.linear + omega_rate.cross(&c) + omega.cross(&omega.cross(&c));
-        let force = (accel - self.machine.gravity) * body.mass;
+        let force = (accel - self.machine.gravity_m_s2) * body.mass_kg;
         let [turning, turning_rate] = [omega, omega_rate].map(|vector| rotation.tr_mul(vector));
         let torque = body.inertia * turning_rate + turning.cross(&(body.inertia * turning));
         [rotation * torque + c.cross(&force), force]
@@ -85,7 +85,7 @@ impl LegByLeg {
 
     /// Direction of a leg, force of the platform on it normal to it, and load along it.
     fn reaction(&self, leg: &Leg, motion: &Motion, arm: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>, f64) {
-        let Machine { cylinder, rod, actuator, gravity, .. } = &self.machine;
+        let Machine { cylinder, rod, actuator, gravity_m_s2: gravity, .. } = &self.machine;
         let (omega, omega_rate) = (&motion.twist.angular, &motion.acceleration.angular);
         let span = motion.pose.position + arm - leg.base;
         let length = span.norm();
@@ -97,23 +97,23 @@ impl LegByLeg {
         let turning = n_rate.norm_squared();
         let length_accel = n.dot(&accel) + length * turning;
 
-        let (e1, r) = (cylinder.center_of_mass, length - rod.center_of_mass);
-        let inertia = cylinder.mass * e1 * e1
-            + rod.mass * r * r
+        let (e1, r) = (cylinder.center_of_mass_m, length - rod.center_of_mass_m);
+        let inertia = cylinder.mass_kg * e1 * e1
+            + rod.mass_kg * r * r
             + cylinder.transverse_inertia.at(length)
             + rod.transverse_inertia.at(length);
-        let (j, mu) = (inertia / (length * length), (cylinder.mass * e1 + rod.mass * r) / length);
-        let across = accel * j - gravity * mu + n_rate * (2.0 * rate * (rod.mass * r / length - j));
+        let (j, mu) = (inertia / (length * length), (cylinder.mass_kg * e1 + rod.mass_kg * r) / length);
+        let across = accel * j - gravity * mu + n_rate * (2.0 * rate * (rod.mass_kg * r / length - j));
         let k = leg.universal_axis.cross(&n);
         let (un, un_rate, p) = (leg.universal_axis.dot(&n), leg.universal_axis.dot(&n_rate), n_rate.dot(&k));
         let un_over_yy = un / k.norm_squared();
         let spin = un_over_yy * p;
         let p_rate = (accel.dot(&k) - 2.0 * rate * p) / length;
         let spin_rate = (un_rate * (p + 2.0 * un * spin) + un * p_rate) / k.norm_squared();
-        let axial_inertia = (cylinder.axial_inertia + rod.axial_inertia) / length;
+        let axial_inertia = (cylinder.axial_inertia_kg_m2 + rod.axial_inertia_kg_m2) / length;
         let across = across + (n_rate.cross(&n) * spin + k * (un_over_yy * spin_rate)) * axial_inertia;
-        let along = rod.mass * ((accel - gravity).dot(&n) + rod.center_of_mass * turning);
-        let drive = actuator.reflected_mass * length_accel
+        let along = rod.mass_kg * ((accel - gravity).dot(&n) + rod.center_of_mass_m * turning);
+        let drive = actuator.reflected_mass_kg * length_accel
             + leg.viscous_friction * rate
             + leg.coulomb_friction * actuator.sign(rate);
         (n, across - n * across.dot(&n), along + drive)

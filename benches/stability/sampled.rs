@@ -36,7 +36,7 @@ fn loops() -> Vec<SampledLoop> {
     let of = |damping_ratio, mass_ratio| SampledLoop {
         wn_t: f64::NAN,
         damping_ratio,
-        delay: f64::NAN,
+        delay_periods: f64::NAN,
         mass_ratio,
         ..SampledLoop::default()
     };
@@ -47,18 +47,18 @@ fn loops() -> Vec<SampledLoop> {
 
 pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
     let mut config = hexad_support::deployed("fried2008");
-    config.machine.gravity.fill(0.0);
+    config.machine.gravity_m_s2.fill(0.0);
     let delays = if quick { vec![QUICK_DELAY] } else { delays(FOUND) };
     let mut rows = vec![];
     for sampled in loops() {
         let SampledLoop { damping_ratio, mass_ratio, .. } = sampled;
         let found: Vec<At> = delays
             .par_iter()
-            .map(|delay| (*delay, boundary(&config, &SampledLoop { delay: *delay, ..sampled })))
+            .map(|delay| (*delay, boundary(&config, &SampledLoop { delay_periods: *delay, ..sampled })))
             .collect();
         let mut worst = 0.0_f64;
         for (delay, found) in &found {
-            let predicted = SampledLoop { delay: *delay, ..sampled }.largest_wn_t();
+            let predicted = SampledLoop { delay_periods: *delay, ..sampled }.largest_wn_t();
             worst = worst.max((found / predicted - 1.0).abs());
             let [predicted, found] = [predicted, *found].map(|wn_t| format!("{wn_t:.4}"));
             rows.push(cells([&damping_ratio, &mass_ratio, delay, &predicted, &found]));
@@ -117,7 +117,7 @@ fn lines(
     label: fn(&SampledLoop) -> String,
 ) -> Vec<(String, Vec<At>, Vec<Vec<At>>)> {
     let predict = |sampled: &SampledLoop| -> Vec<At> {
-        let limit = |delay| SampledLoop { delay, ..*sampled }.largest_wn_t();
+        let limit = |delay| SampledLoop { delay_periods: delay, ..*sampled }.largest_wn_t();
         delays(PREDICTED).into_iter().map(|delay| (delay, limit(delay))).collect()
     };
     let predicted: Vec<_> = loops.iter().map(predict).collect();

@@ -88,7 +88,7 @@ pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
             let mut add = |method: String, find: &dyn Fn(&Case) -> Pose| {
                 let errors = cases.iter().map(|case| {
                     let way = find(case).displacement_to(&case.there);
-                    way.linear.norm().max(way.angular.norm() * machine.joints.radius)
+                    way.linear.norm().max(way.angular.norm() * machine.joints.radius_m)
                 });
                 let error = errors.fold(0.0, f64::max);
                 let mut samples = Samples::default();

@@ -63,7 +63,7 @@ impl ConfirmLegsArguments {
         }
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
         let actuator = &config.machine.actuator;
-        let stroke = actuator.max_length - actuator.min_length;
+        let stroke = actuator.max_length_m - actuator.min_length_m;
         let distance = self.distance.unwrap_or(DISTANCE_M.min(STROKE_SHARE * stroke));
         let stops = status(&config.name)?.status.and_then(|report| report.stops);
         let mut client = MotionClient::connect(&config.name, &stop)?;
@@ -127,7 +127,7 @@ fn targets(
         };
         let x = task_coordinates(tracker.pose(), &machine.home);
         let order =
-            GotoOrder { target: x.map(Some), relative: false, home: false, speed: SPEED, tolerance_m: None };
+            GotoOrder { target: x.map(Some), relative: false, home: false, speed_share: SPEED, tolerance_m: None };
         let plan = GotoPlan::new(config, &constants, &order, &Coordinates::default(), false, seen, || true);
         plan.map(|plan| plan.to).map_err(|error| error.to_string())
     };
@@ -273,7 +273,7 @@ mod tests {
             let seen = Observation { reference: Some(home), target: Some(home), ..Observation::default() };
             // The margin of the stroke is a few millimetres.
             for (room, is_longer) in [(0.1, true), (12e-3, false)] {
-                config.machine.actuator.max_length = longest + room;
+                config.machine.actuator.max_length_m = longest + room;
                 let targets = targets(&config, &seen, &home, 20e-3).unwrap();
                 for (leg, x) in targets.iter().enumerate() {
                     let now = leg_lengths(&config.machine, &pose_of(x));
@@ -290,8 +290,8 @@ mod tests {
                     );
                 }
             }
-            config.machine.actuator.min_length = lengths.iter().copied().fold(longest, f64::min) - 5e-3;
-            config.machine.actuator.max_length = longest + 5e-3;
+            config.machine.actuator.min_length_m = lengths.iter().copied().fold(longest, f64::min) - 5e-3;
+            config.machine.actuator.max_length_m = longest + 5e-3;
             let Failure { exit_code, message } = targets(&config, &seen, &home, 50e-3).unwrap_err();
             assert_eq!(exit_code, 2);
             assert!(

@@ -86,7 +86,7 @@ fn rows(excitation: &Excitation) -> CsvWriter {
 /// Duration, condition, and the predicted standard deviations.
 fn summary(config: &Config, excitation: &Excitation) -> String {
     let machine = &config.machine;
-    let noise_n = NOISE_RATIO * machine.actuator.max_force;
+    let noise_n = NOISE_RATIO * machine.actuator.max_force_n;
     let count = f64::from(excitation.periods()) * PERIOD_S * NOISE_RATE_HZ;
     let sensitivities = Sensitivities::new(machine, excitation.series());
     let deviations =

@@ -66,7 +66,7 @@ impl ForwardKinematicsArguments {
 
 /// Says which rows have lengths that the legs cannot have, and what else the numbers may be.
 fn stroke_remark(machine: &Machine, table: &NumberTable) -> Option<String> {
-    let Actuator { min_length: min, max_length: max, .. } = machine.actuator;
+    let Actuator { min_length_m: min, max_length_m: max, .. } = machine.actuator;
     let tolerance = STROKE_TOLERANCE * (max - min);
     let is_inside = |length: &f64| (min - tolerance..=max + tolerance).contains(length);
     let rows = || table.rows().iter().map(|row| (time(row), six(row, 1)));

@@ -46,9 +46,9 @@ const JOINT_SPACE: [JointColumn; 11] = [
     ("joint_bias_length", |leg| leg.bias.z),
     ("joint_accel_beta", |leg| leg.accel.x),
     ("joint_accel_gamma", |leg| leg.accel.y),
-    ("contact_force_x", |leg| leg.contact_force.x),
-    ("contact_force_y", |leg| leg.contact_force.y),
-    ("contact_force_z", |leg| leg.contact_force.z),
+    ("contact_force_x", |leg| leg.contact_force_n.x),
+    ("contact_force_y", |leg| leg.contact_force_n.y),
+    ("contact_force_z", |leg| leg.contact_force_n.z),
 ];
 
 impl InverseDynamicsArguments {
@@ -95,8 +95,8 @@ pub fn inverse_dynamics(
         let dynamics = joint_space(machine, motion, &forces);
         let joint_values: Vec<_> = added.iter().flat_map(|(_, of)| dynamics.iter().map(of)).collect();
         unsolved.add(time(row), forces.iter().chain(&joint_values).all(|value| value.is_finite()));
-        let commands = Transmission::new(&machine.actuator, &motions.rate).commands(&forces);
-        let known = forces.into_iter().chain(motions.length).chain(motions.rate).chain(motions.accel);
+        let commands = Transmission::new(&machine.actuator, &motions.rate_m_s).commands(&forces);
+        let known = forces.into_iter().chain(motions.length_m).chain(motions.rate_m_s).chain(motions.accel_m_s2);
         let known = known.chain(commands);
         writer.row([time(row)].into_iter().chain(known).chain(joint_values));
     }

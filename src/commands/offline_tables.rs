@@ -103,7 +103,7 @@ fn in_task_coordinates(
             Ok(state) => {
                 near = state.x.into();
                 let width = if has_derivatives { usize::MAX } else { needed };
-                rows.push(numbers(Knot { t: time(row), state }).take(width).collect());
+                rows.push(numbers(Knot { t_s: time(row), state }).take(width).collect());
             }
             Err(error) => errors.add(format!("line {line}: {error}")),
         }
@@ -117,13 +117,13 @@ fn continue_angles(table: &mut NumberTable, home: &[f64; 6]) {
     for row in table.rows_mut() {
         let state = task_state(row).nearest_to(&near);
         near = state.x.into();
-        let nearest = numbers(Knot { t: time(row), state });
+        let nearest = numbers(Knot { t_s: time(row), state });
         row.iter_mut().zip(nearest).for_each(|(number, nearest)| *number = nearest);
     }
 }
 
 /// The numbers of a row of a trajectory.
-fn numbers(Knot { t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
+fn numbers(Knot { t_s: t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
     [t].into_iter().chain([x, xd, xdd].into_iter().flat_map(<[f64; 6]>::from))
 }
 
@@ -139,7 +139,7 @@ fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, Tabl
     let mut knots: Vec<_> = table
         .rows()
         .iter()
-        .map(|row| Knot { t: time(row), state: TaskState::at_rest(six(row, 1)) })
+        .map(|row| Knot { t_s: time(row), state: TaskState::at_rest(six(row, 1)) })
         .collect();
     if pose_spline::complete(&mut knots).is_none() {
         let mut errors = TableErrors::new(path);
@@ -182,7 +182,7 @@ mod tests {
     fn read(start: [f64; 3], triple: fn([f64; 3]) -> [f64; 3]) -> NumberTable {
         let mut text = pose_columns().join(",") + "\n";
         for t in (0..=40).map(|k| 0.05 * f64::from(k)) {
-            let [alpha, beta, gamma] = triple(start.map(|angle| angle + 0.2 * rise(t, 2.0).value));
+            let [alpha, beta, gamma] = triple(start.map(|angle| angle + 0.2 * rise(t, 2.0).value_share));
             text += &format!("{t},{alpha:?},{beta:?},{gamma:?},0,0,0.65\n");
         }
         let file = tempfile::NamedTempFile::new().unwrap();

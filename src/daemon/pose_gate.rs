@@ -91,7 +91,7 @@ impl PoseGate {
             return Err(format!("no pose {number}; {list}"));
         };
         let moved = |(one, other): (&f64, &f64)| (one - other).abs() > MOVED_SHARE * other;
-        if measurement.is_none_or(|now| now.length.iter().zip(&list.lengths).any(moved)) {
+        if measurement.is_none_or(|now| now.length_m.iter().zip(&list.lengths).any(moved)) {
             self.decide(found, Input::SEARCHING);
             return Err(
                 "the platform has moved since the poses were listed; repeat hexad engage without --pose"

@@ -54,7 +54,7 @@ impl Precheck {
 
     /// The same with a reserve to each limit. Home at rest satisfies the reduced limits, too.
     pub fn with_reserve(mut self) -> Self {
-        let Parameters { limits, envelope, condition, .. } = &mut self.parameters;
+        let Parameters { limits, envelope, max_condition: condition, .. } = &mut self.parameters;
         limits.position = limits.position.scaled(USABLE_SHARE);
         limits.orientation = limits.orientation.scaled(USABLE_SHARE);
         let home = Vector6::from(self.machine.home);
@@ -68,7 +68,7 @@ impl Precheck {
         let drives = DriveCapability::new(&self.machine, &self.machine.home_pose());
         let available = self.machine.actuator.available_force();
         let at_home = drives.map_or(0.0, |drives| drives.hardest_held().1 / (MAX_HOLDING_SHARE * available));
-        self.machine.actuator.max_force *= at_home + USABLE_SHARE * (1.0 - at_home);
+        self.machine.actuator.max_force_n *= at_home + USABLE_SHARE * (1.0 - at_home);
         self
     }
 
@@ -77,7 +77,7 @@ impl Precheck {
         let setpoint = SetpointMotion::new(Setpoint::motion(0, *state));
         let kinematic_state = KinematicState::new(&self.machine, setpoint.motion.pose);
         check_setpoint(&self.machine, &self.parameters, &setpoint, &mut LimitSet::default()).is_ok()
-            && kinematic_state.sensitivity().condition <= self.parameters.condition
+            && kinematic_state.sensitivity().condition <= self.parameters.max_condition
     }
 
     /// The first setpoint from `from` to `to` that the daemon would refuse, if it followed the trajectory
@@ -126,7 +126,7 @@ impl Precheck {
                 let active_limits = active_limits.union(reference.active_limits());
                 let policy = self.parameters.on_violation;
                 let refusal = SetpointRefusal {
-                    t: self.time(from, k),
+                    t_s: self.time(from, k),
                     diagnostic: Some(diagnostic),
                     active_limits,
                     policy,
@@ -146,7 +146,7 @@ impl Precheck {
         if moved < LEAST_MOVED_SHARE * wanted {
             let policy = self.parameters.on_violation;
             let active_limits = reference.active_limits();
-            let _ = refused(SetpointRefusal { t: to, diagnostic: None, active_limits, policy });
+            let _ = refused(SetpointRefusal { t_s: to, diagnostic: None, active_limits, policy });
         }
     }
 
@@ -160,7 +160,7 @@ impl Precheck {
 #[derive(Clone, Copy, Debug)]
 pub struct SetpointRefusal {
     /// Time since the start of the trajectory \[s\].
-    pub t: f64,
+    pub t_s: f64,
     /// `None`: the reference did not follow at all.
     diagnostic: Option<Diagnostic>,
     active_limits: LimitSet,
@@ -172,7 +172,7 @@ const ADVICE_OF_LIMIT: &str = ", or set [setpoint] on_violation to limit";
 
 impl fmt::Display for SetpointRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { t, diagnostic, active_limits, policy } = self;
+        let Self { t_s: t, diagnostic, active_limits, policy } = self;
         write!(f, "t = {t:.4}: ")?;
         let Some(diagnostic) = diagnostic else {
             return write!(

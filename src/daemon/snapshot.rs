@@ -13,7 +13,7 @@ pub struct Snapshot {
     /// Times of the last complete second.
     pub window: LoopTimes,
     /// Forces \[N\]; zero unless the state has control.
-    pub force: [f64; LEGS],
+    pub command_n: [f64; LEGS],
     /// CLOCK_MONOTONIC instant at which it was published \[ns\]; 0 before the first cycle.
     pub time_ns: u64,
     /// The newest setpoint; `None` if none ever arrived.

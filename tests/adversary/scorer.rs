@@ -71,7 +71,7 @@ impl Driven {
             let force = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
             let mut expected = self.task(&config.machine, released_s + period_s).motion();
             reference(&mut expected);
-            let output = Output { state: State::Engaging, force, ..Output::default() };
+            let output = Output { state: State::Engaging, command_n: force, ..Output::default() };
             observed.apply(&output, Some(expected));
         }
         observed.meter().extremes
@@ -164,7 +164,7 @@ fn too_large_a_condition_is_seen() {
     let below = |ratio: f64| {
         move |machine: &Machine, parameters: &mut Parameters| {
             let at = |t: f64| of(machine, &GENTLE.task(machine, t));
-            parameters.condition = ratio * at(0.0).max(at(GENTLE.duration_s));
+            parameters.max_condition = ratio * at(0.0).max(at(GENTLE.duration_s));
         }
     };
     GENTLE.assert_seen(Quantity::Condition, below(0.97));
@@ -178,7 +178,7 @@ fn the_end_of_a_stroke_is_seen() {
     let task =
         TaskState { xdd: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0].into(), ..TaskState::at_rest(config.machine.home) };
     let force = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
-    let output = Output { state: State::Active, force, ..Output::default() };
+    let output = Output { state: State::Active, command_n: force, ..Output::default() };
     let mut before = f64::NEG_INFINITY;
     while observed.meter().impact_m_s.is_none() {
         assert!(before <= 1.0, "beyond the stroke without an end stop: {before}");
@@ -217,7 +217,7 @@ fn a_reference_beyond_a_limit_is_seen() {
     let near = |machine: &Machine, parameters: &mut Parameters| {
         let at_home = KinematicState::new(machine, machine.home_pose()).lengths(machine);
         let margins = at_home.map(|length| machine.actuator.margin(length));
-        parameters.stroke_margin = 2.2 * margins.into_iter().fold(f64::INFINITY, f64::min);
+        parameters.stroke_margin_m = 2.2 * margins.into_iter().fold(f64::INFINITY, f64::min);
     };
     GENTLE.assert_only(Quantity::ReferenceStroke, near, |_| {});
 }
@@ -320,8 +320,8 @@ fn a_controller_that_is_wrong_is_found() {
             parameters.limits.position.jerk *= 2.0;
         }),
         ("stroke", |machine, _| {
-            machine.actuator.min_length -= 0.01;
-            machine.actuator.max_length += 0.01;
+            machine.actuator.min_length_m -= 0.01;
+            machine.actuator.max_length_m += 0.01;
         }),
         ("envelope", |_, parameters| {
             if let Some(envelope) = &mut parameters.envelope {

@@ -31,7 +31,7 @@ pub fn print(observed: &Rig, input: &Input, output: &Output, before: &mut Extrem
     });
     let condition = KinematicState::new(&observed.machine, state.pose).sensitivity().condition;
     let sine = universal_sine(&observed.machine, &state.pose);
-    let force = output.force.iter().fold(0.0_f64, |largest, force| largest.max(force.abs()));
+    let force = output.command_n.iter().fold(0.0_f64, |largest, force| largest.max(force.abs()));
     let (away, away_rate) = output.error.map_or((f64::NAN, f64::NAN), |PoseError { pose, twist }| {
         (pose.vector().norm(), twist.vector().norm())
     });

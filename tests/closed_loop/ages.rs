@@ -34,7 +34,7 @@ fn wobble_with(
     mass: f64,
 ) -> Result<f64, DiagnosticCode> {
     let mut platform = config.machine.clone();
-    platform.platform.mass *= mass;
+    platform.platform.mass_kg *= mass;
     let mut control = Rig::imperfect(config, &platform, &Imperfections::default());
     control.controller = Controller::new(&config.machine, *parameters);
     let home = TaskState::at_rest(config.machine.home);
@@ -108,9 +108,9 @@ fn certificate_ages_are_stood_without_an_oscillation_or_refused() {
 fn at_fastest_pose(machine: &str, lines: &str) -> (Config, f64) {
     let mut config = configured(machine, lines);
     let survey = HeldForces::new(&config.machine).survey(WITHIN_LIMIT * config.deployment.limits.condition);
-    let fastest = survey.iter().max_by(|a, b| a.pole.total_cmp(&b.pole)).unwrap();
+    let fastest = survey.iter().max_by(|a, b| a.pole_per_s.total_cmp(&b.pole_per_s)).unwrap();
     config.machine.home = task_coordinates(&fastest.pose, &config.machine.home);
-    (config, fastest.pole)
+    (config, fastest.pole_per_s)
 }
 
 /// More than any age of the tests \[ns\].

@@ -45,7 +45,7 @@ fn run(config: &Config, mass_ratio: f64, beside: impl Fn(f64) -> [f64; LEGS]) ->
         let since_s = (f64::from(cycle) - f64::from(before)) * PERIOD_S;
         if cycle == before {
             let mut loaded = config.machine.clone();
-            loaded.platform.mass *= mass_ratio;
+            loaded.platform.mass_kg *= mass_ratio;
             rig.put(Rig::new(config, &loaded).hardware);
         }
         let input = rig.input(&home);
@@ -61,7 +61,7 @@ fn run(config: &Config, mass_ratio: f64, beside: impl Fn(f64) -> [f64; LEGS]) ->
         }
         end.farthest = end.farthest.max((state.pose.position - home.motion().pose.position).norm());
         let beside = if since_s >= 0.0 { beside(since_s) } else { [0.0; LEGS] };
-        rig.pass(Some(core::array::from_fn(|leg| output.force[leg] + beside[leg])));
+        rig.pass(Some(core::array::from_fn(|leg| output.command_n[leg] + beside[leg])));
     }
     end
 }
@@ -84,7 +84,7 @@ fn push(config: &Config, acceleration: [f64; 6]) -> [f64; LEGS] {
 #[test]
 fn a_payload_that_comes_or_goes_ends_in_a_stop_unless_it_is_allowed() {
     let mut config = deployed("motion_base");
-    let mass = config.machine.platform.mass;
+    let mass = config.machine.platform.mass_kg;
     for ratio in [1.2, 0.8] {
         for allowed in [None, Some(0.05 * mass), Some(0.25 * mass), Some(f64::INFINITY)] {
             config.deployment.limits.payload_change_kg = allowed;
@@ -113,7 +113,7 @@ fn certificate_a_process_force_is_a_fault_unless_it_is_allowed() {
     });
     cases(all, 5).into_par_iter().for_each(|(axis, ratio, hertz)| {
         let mut config = deployed("motion_base");
-        let weight = config.machine.gravity.norm();
+        let weight = config.machine.gravity_m_s2.norm();
         let mut acceleration = [0.0; 6];
         acceleration[axis] = ratio * weight;
         let push = push(&config, acceleration);

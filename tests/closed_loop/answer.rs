@@ -19,7 +19,7 @@ pub fn answer(config: &Config, error: &Vector6<f64>) -> Vector6<f64> {
         &parameters.law.leg_masses,
         parameters.fidelity,
     );
-    let largest = input_matrix.largest_compensable_disturbance(&parameters.law.max_compensated_disturbance);
+    let largest = input_matrix.largest_compensable_disturbance(&parameters.law.max_compensated_acceleration);
     let estimate = ErrorEstimate {
         value: error * by_e,
         rate: error * (by_w / period_s),

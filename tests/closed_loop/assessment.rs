@@ -18,10 +18,10 @@ use hexad_support::{angle_between, deployed};
 /// Following limits that nothing reaches.
 fn wide(parameters: Parameters) -> Parameters {
     Parameters {
-        following_position: 1e9,
-        following_orientation: 1e9,
-        following_velocity: 1e9,
-        following_angular_velocity: 1e9,
+        following_position_m: 1e9,
+        following_orientation_rad: 1e9,
+        following_velocity_m_s: 1e9,
+        following_angular_velocity_rad_s: 1e9,
         ..parameters
     }
 }
@@ -30,7 +30,7 @@ fn wide(parameters: Parameters) -> Parameters {
 fn each_following_limit_alone_ends_control() {
     let config = deployed("motion_base");
     let mut heavy = config.machine.clone();
-    heavy.platform.mass *= 1.1;
+    heavy.platform.mass_kg *= 1.1;
     let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
     let parameters = parameters(&config);
     let ends = |parameters: Parameters| {
@@ -50,10 +50,10 @@ fn each_following_limit_alone_ends_control() {
     let narrow = 1e-6;
     let (position, velocity) = (DiagnosticCode::FollowingError, DiagnosticCode::VelocityError);
     for (parameters, code) in [
-        (Parameters { following_position: narrow, ..wide(parameters) }, position),
-        (Parameters { following_orientation: narrow, ..wide(parameters) }, position),
-        (Parameters { following_velocity: narrow, ..wide(parameters) }, velocity),
-        (Parameters { following_angular_velocity: narrow, ..wide(parameters) }, velocity),
+        (Parameters { following_position_m: narrow, ..wide(parameters) }, position),
+        (Parameters { following_orientation_rad: narrow, ..wide(parameters) }, position),
+        (Parameters { following_velocity_m_s: narrow, ..wide(parameters) }, velocity),
+        (Parameters { following_angular_velocity_rad_s: narrow, ..wide(parameters) }, velocity),
     ] {
         let found = ends(parameters).unwrap_or_default();
         assert_eq!((found.code, found.bound), (code, 1.0));
@@ -80,9 +80,9 @@ fn a_condition_beyond_the_limit_ends_control_and_prevents_it() {
     let mut codes = Vec::new();
     for factor in [0.8, 1.25] {
         let mut plant = config.machine.clone();
-        plant.platform.mass *= factor;
+        plant.platform.mass_kg *= factor;
         let mut rig = Rig::new(&config, &plant);
-        let parameters = Parameters { condition: condition * (1.0 + 1e-8), ..wide(parameters(&config)) };
+        let parameters = Parameters { max_condition: condition * (1.0 + 1e-8), ..wide(parameters(&config)) };
         rig.controller = Controller::new(&config.machine, parameters);
         rig.ask(Request::Engage);
         let mut output = rig.cycle(&rig.input(&home));
@@ -96,7 +96,7 @@ fn a_condition_beyond_the_limit_ends_control_and_prevents_it() {
     }
     assert!(codes.contains(&(State::Stopping, DiagnosticCode::NearSingular)), "{codes:?}");
     let mut rig = Rig::new(&config, &config.machine);
-    let parameters = Parameters { condition: condition * 0.99, ..parameters(&config) };
+    let parameters = Parameters { max_condition: condition * 0.99, ..parameters(&config) };
     rig.controller = Controller::new(&config.machine, parameters);
     rig.ask(Request::Engage);
     let output = rig.cycle(&rig.input(&home));
@@ -128,7 +128,7 @@ fn control_does_not_begin_without_a_verified_stop() {
             let motion = Motion { pose: task.motion().pose, twist, acceleration: Acceleration::default() };
             let legs = leg_motion(&config.machine, &motion);
             let measurement = input.measurement.as_mut().unwrap();
-            (measurement.length, measurement.rate) = (legs.length, Some(legs.rate));
+            (measurement.length_m, measurement.rate_m_s) = (legs.length_m, Some(legs.rate_m_s));
             if k <= 3 {
                 output = Some(rig.controller.step(&input));
             }
@@ -161,12 +161,12 @@ fn states_end_where_their_motion_does() {
     // Distance of the reference from a task over the engage tolerance, when a state ends.
     let distance = |motion: &Motion, task: &TaskState| {
         let pose = task.motion().pose;
-        let position = (motion.pose.position - pose.position).norm() / parameters.engage_position;
-        position.max(angle_between(&motion.pose.rotation, &pose.rotation) / parameters.engage_orientation)
+        let position = (motion.pose.position - pose.position).norm() / parameters.engage_position_m;
+        position.max(angle_between(&motion.pose.rotation, &pose.rotation) / parameters.engage_orientation_rad)
     };
     let home = TaskState::at_rest(config.machine.home);
     let mut near = home;
-    near.x[4] += 0.9 * parameters.engage_position;
+    near.x[4] += 0.9 * parameters.engage_position_m;
     let mut rig = Rig::new(&config, &config.machine);
     rig.ask(Request::Engage);
     let mut before = rig.cycle(&rig.input(&near));

@@ -36,7 +36,7 @@ fn shaped(config: &Config, motion: BuiltInMotion, seconds: f64) -> FittedMotion 
 
 /// How much smaller it was made.
 fn share(config: &Config, scene: &FittedMotion) -> f64 {
-    scene.angle_share / fit(&config.machine, scene.motion, scene.duration).angle_share
+    scene.angle_share / fit(&config.machine, scene.motion, scene.duration_s).angle_share
 }
 
 /// As gently as the limits ask for, which may take some seconds.
@@ -48,7 +48,7 @@ fn engage(rig: &mut Rig, task: &TaskState) {
 
 /// Plays a scene, its first instant this part of a cycle after a setpoint.
 fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
-    first_refusal(config, |t| scene.at(t), scene.duration, phase, 0).is_none()
+    first_refusal(config, |t| scene.at(t), scene.duration_s, phase, 0).is_none()
 }
 
 /// The time \[s\] at which a motion is no longer followed, and why.
@@ -92,12 +92,12 @@ fn certificate_an_excitation_of_weak_drives_is_followed() {
             Ok(excitation) => excitation,
             // What cannot be shown is refused before it moves.
             Err(refusal) => {
-                return println!("{} {}: {refusal}", config.name, config.machine.actuator.max_force);
+                return println!("{} {}: {refusal}", config.name, config.machine.actuator.max_force_n);
             }
         };
         for phase in [0.0, 0.37, 0.5] {
             let refusal = first_refusal(&config, |t| excitation.at(t), excitation.duration(), phase, 0);
-            assert_eq!(refusal, None, "{} {}", config.name, config.machine.actuator.max_force);
+            assert_eq!(refusal, None, "{} {}", config.name, config.machine.actuator.max_force_n);
         }
     });
 }
@@ -113,7 +113,7 @@ fn certificate_what_the_precheck_accepts_is_followed() {
         let precheck = Precheck::new(&config);
         let is_taken = |share: f64| {
             let scene = scene.smaller(share);
-            precheck.refusal(|t| scene.at(t), [0.0, scene.duration]).is_none()
+            precheck.refusal(|t| scene.at(t), [0.0, scene.duration_s]).is_none()
         };
         let (mut low, mut high) = (0.0, 2.0);
         for _ in 0..10 {
@@ -122,8 +122,8 @@ fn certificate_what_the_precheck_accepts_is_followed() {
         }
         let scene = scene.smaller(0.99 * low);
         for phase in [0.0, 0.37, 0.5, 0.9] {
-            let refusal = first_refusal(&config, |t| scene.at(t), scene.duration, phase, u64::MAX);
-            let force = config.machine.actuator.max_force;
+            let refusal = first_refusal(&config, |t| scene.at(t), scene.duration_s, phase, u64::MAX);
+            let force = config.machine.actuator.max_force_n;
             assert_eq!(refusal, None, "{} {force} {motion:?} {low}, phase {phase}", config.name);
         }
     });
@@ -134,11 +134,11 @@ fn certificate_what_the_precheck_accepts_is_followed() {
 fn leave_a_reserve_of_the_rates_of_the_legs() {
     for name in MACHINES {
         let mut machine = deployed(name).machine;
-        machine.actuator.max_rate *= 0.1;
+        machine.actuator.max_rate_m_s *= 0.1;
         let scene = fit(&machine, BuiltInMotion::Sines, 8.0);
         let rates =
-            (0..=1000).flat_map(|k| leg_motion(&machine, &scene.at(8e-3 * f64::from(k)).motion()).rate);
-        let used = rates.fold(0.0, |most: f64, rate| most.max(rate.abs())) / machine.actuator.max_rate;
+            (0..=1000).flat_map(|k| leg_motion(&machine, &scene.at(8e-3 * f64::from(k)).motion()).rate_m_s);
+        let used = rates.fold(0.0, |most: f64, rate| most.max(rate.abs())) / machine.actuator.max_rate_m_s;
         assert!((0.6..=0.8).contains(&used), "{name}: {used}");
     }
 }
@@ -241,7 +241,7 @@ fn that_could_not_be_seen_are_refused_with_the_reason() {
     }
     // Within the tolerance of every setpoint, and at rest.
     let mut config = deployed("motion_base");
-    config.machine.actuator.min_length = 1e-6;
+    config.machine.actuator.min_length_m = 1e-6;
     let refused = Trajectory::built_in(&config, BuiltInMotion::Sines, 8.0);
     assert!(refused.as_ref().is_err_and(|error| error.to_string().contains("limits")), "{refused:?}");
 }

@@ -25,7 +25,7 @@ const HEAVY: f64 = 1.2;
 /// Outputs of some seconds at home with a heavy platform, and its position error then \[m\].
 fn held(config: &Config, seconds: u32) -> (Vec<Output>, f64) {
     let mut heavy = config.machine.clone();
-    heavy.platform.mass *= HEAVY;
+    heavy.platform.mass_kg *= HEAVY;
     let mut rig = Rig::new(config, &heavy);
     let home = TaskState::at_rest(config.machine.home);
     rig.engage(&home);
@@ -82,7 +82,7 @@ fn the_first_start_bears_a_platform_that_is_a_seventh_heavier_or_lighter() {
         set(&mut table, "limits", "feedback_scale", 4.0);
         let config = edited::config(&table);
         let mut other = config.machine.clone();
-        other.platform.mass *= mass_ratio;
+        other.platform.mass_kg *= mass_ratio;
         other.platform.inertia *= mass_ratio;
         let mut rig = Rig::new(&config, &other);
         rig.engage(&home);
@@ -99,7 +99,7 @@ fn overshoot(config: &Config) -> f64 {
     let home = TaskState::at_rest(config.machine.home);
     rig.engage(&home);
     let mut heavy = config.machine.clone();
-    heavy.platform.mass *= 1.3;
+    heavy.platform.mass_kg *= 1.3;
     let still = home.motion();
     let weight = [&heavy, &config.machine]
         .map(|machine| InverseDynamics::new(machine).forces::<Gravity>(&still).unwrap());
@@ -112,7 +112,7 @@ fn overshoot(config: &Config) -> f64 {
         limited += u32::from(output.active_limits.contains(Limit::Force));
         let loaded = cycle < 300;
         rig.pass(Some(core::array::from_fn(|leg| {
-            output.force[leg] - if loaded { weight[0][leg] - weight[1][leg] } else { 0.0 }
+            output.command_n[leg] - if loaded { weight[0][leg] - weight[1][leg] } else { 0.0 }
         })));
         if !loaded {
             highest = highest.max(rig.simulator().state().pose.position.z - config.machine.home[5]);
@@ -127,7 +127,7 @@ fn it_does_not_wind_up_while_forces_are_limited() {
     let weak = |is_compensating| {
         let mut config = compensating(is_compensating);
         // Enough for the platform, not for the load.
-        config.machine.actuator.max_force = 4300.0;
+        config.machine.actuator.max_force_n = 4300.0;
         config.deployment.control.following_position_m = 10.0;
         config.deployment.control.following_orientation_rad = 10.0;
         // Feedback has no bound of its own here: the limit of the forces is what holds the platform back.
@@ -140,7 +140,7 @@ fn it_does_not_wind_up_while_forces_are_limited() {
     let (without, with) = (overshoot(&weak(false)), overshoot(&config));
     // What it would lift the platform by if it had all that it may have: half of the limit of acceleration.
     let parameters = parameters(&config);
-    let wound_up = 0.5 * parameters.limits.position.acceleration / parameters.law.position.stiffness;
+    let wound_up = 0.5 * parameters.limits.position.acceleration / parameters.law.position.kp_per_s2;
     println!("overshoot without {without:e} m, with {with:e} m, wound up {wound_up:e} m");
     assert!(without < 1e-5 && with < 0.7 * wound_up, "{with} after {without}");
 }
@@ -150,7 +150,7 @@ fn it_does_not_wind_up_while_forces_are_limited() {
 fn it_begins_anew_with_each_engagement() {
     let config = compensating(true);
     let mut heavy = config.machine.clone();
-    heavy.platform.mass *= 1.2;
+    heavy.platform.mass_kg *= 1.2;
     let mut rig = Rig::new(&config, &heavy);
     let home = TaskState::at_rest(config.machine.home);
     let first = |rig: &mut Rig| {
@@ -159,7 +159,7 @@ fn it_begins_anew_with_each_engagement() {
             &rig.simulator().state().pose,
             &config.machine.home,
         ));
-        rig.controller.clone().step(&rig.input(&setpoint)).force
+        rig.controller.clone().step(&rig.input(&setpoint)).command_n
     };
     rig.cycle(&rig.input(&home));
     let fresh = first(&mut rig);

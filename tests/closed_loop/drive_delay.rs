@@ -58,20 +58,20 @@ fn certificate_the_delay_of_the_drives_is_measured() {
     let all = loops.into_iter().flat_map(|control| drives.clone().map(move |drive| (control, drive)));
     cases(all, 3).into_par_iter().for_each(|((machine, rate_hz, friction), (dead_ms, is_imperfect))| {
         let config = config(machine, rate_hz);
-        let most = config.machine.actuator.max_force;
+        let most = config.machine.actuator.max_force_n;
                 let drive = DriveErrors { dead_time_ns: (1e6 * dead_ms) as u64, ..DriveErrors::default() };
                 let mut imperfections = Imperfections { seed: 1, drive, ..Imperfections::default() };
                 if is_imperfect {
                     imperfections.sensor =
-                        SensorErrors { length_noise: 2e-6, length_step: 1e-6, ..SensorErrors::default() };
+                        SensorErrors { length_noise_m: 2e-6, length_step_m: 1e-6, ..SensorErrors::default() };
                     imperfections.friction = Friction {
-                        coulomb: friction * most,
-                        viscous: friction * most,
+                        coulomb_n: friction * most,
+                        viscous_n_s_m: friction * most,
                         ..Friction::default()
                     };
                     imperfections.build = BuildErrors {
-                        payload: 0.1 * config.machine.platform.mass,
-                        payload_at: config.machine.platform.center_of_mass
+                        payload_kg: 0.1 * config.machine.platform.mass_kg,
+                        payload_at_m: config.machine.platform.center_of_mass_m
                             + nalgebra::Vector3::new(0.1, 0.05, 0.0),
                         ..BuildErrors::default()
                     };
@@ -96,7 +96,7 @@ fn certificate_the_delay_of_the_drives_is_measured() {
 #[test]
 fn without_motion_there_is_no_delay() {
     let config = config("motion_base", 1000.0);
-    let sensor = SensorErrors { length_noise: 2e-6, ..SensorErrors::default() };
+    let sensor = SensorErrors { length_noise_m: 2e-6, ..SensorErrors::default() };
     let imperfections = Imperfections { seed: 1, sensor, ..Imperfections::default() };
     let found = recorded(&config, &imperfections, BuiltInMotion::Settle);
     let found = drive_delay(&config.machine, &[found]);

@@ -42,7 +42,7 @@ fn engaged(opens_after: usize) -> (Vec<Output>, f64) {
             ..DriveStatus::default()
         };
         let output = rig.controller.step(&reporting(&rig.input(&home), drives));
-        rig.pass((is_open && output.state.has_control()).then_some(output.force));
+        rig.pass((is_open && output.state.has_control()).then_some(output.command_n));
         let way = rig.simulator().state().pose.position - home.motion().pose.position;
         farthest = farthest.max(way.norm());
         outputs.push(output);
@@ -74,7 +74,7 @@ fn engaging_waits_for_the_brakes_and_no_longer_than_the_timeout() {
 #[test]
 fn a_brake_that_closes_or_a_drive_that_faults_ends_control() {
     let config = deployed("motion_base");
-    let ready = DriveStatus { enabled: Some(ALL), brake_open: Some(ALL), fault: Some(0), force: None };
+    let ready = DriveStatus { enabled: Some(ALL), brake_open: Some(ALL), fault: Some(0), force_n: None };
     for (bad, code, longest) in [
         (DriveStatus { brake_open: Some(ALL & !(1 << 2)), ..ready }, DiagnosticCode::DriveNotReady, 22),
         (DriveStatus { enabled: Some(ALL & !(1 << 2)), ..ready }, DiagnosticCode::DriveNotReady, 22),
@@ -120,7 +120,7 @@ fn with_forces(
             let mut force: [f64; LEGS] = arrived[arrived.len() - 1 - late];
             force = force.map(|force| scale * force);
             force[1] *= reported;
-            let drives = DriveStatus { force: Some(force), ..DriveStatus::default() };
+            let drives = DriveStatus { force_n: Some(force), ..DriveStatus::default() };
             input = reporting(&input, drives);
         }
         if is_down(k) {
@@ -133,7 +133,7 @@ fn with_forces(
             return Some((k, output.diagnostic.code, output.diagnostic.index, farthest));
         }
         let held = arrived.last().copied().filter(|_| is_down(k));
-        let mut acts = held.unwrap_or(output.force);
+        let mut acts = held.unwrap_or(output.command_n);
         arrived.push(acts);
         acts[1] *= acting;
         let way = rig.simulator().state().pose.position - task.motion().pose.position;

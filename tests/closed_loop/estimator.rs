@@ -31,14 +31,14 @@ fn rms_um(
     rates: Rates,
 ) -> Result<f64, DiagnosticCode> {
     let mut platform = config.machine.clone();
-    platform.platform.mass *= mass;
+    platform.platform.mass_kg *= mass;
     let mut control = Rig::imperfect(config, &platform, imperfections);
     control.rates = rates;
     control.play_fast(config).map(|tracking| 1e6 * tracking.position.rms())
 }
 
 fn with_noise(metres: f64) -> Imperfections {
-    let sensor = SensorErrors { length_noise: metres, rate_noise: 1e2 * metres, ..SensorErrors::default() };
+    let sensor = SensorErrors { length_noise_m: metres, rate_noise_m_s: 1e2 * metres, ..SensorErrors::default() };
     Imperfections { seed: 1, sensor, ..Imperfections::default() }
 }
 

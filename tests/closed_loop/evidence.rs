@@ -48,35 +48,35 @@ fn assert_evidence(output: &Output, cause: DiagnosticCode, value: f64, bound: f6
 #[test]
 fn measurements_are_refused_with_leg_value_and_bound() {
     let (rig, home) = at_rest();
-    let length = rig.input(&home).measurement.unwrap().length;
+    let length = rig.input(&home).measurement.unwrap().length_m;
     let actuator = deployed("motion_base").machine.actuator;
-    let stroke = actuator.max_length - actuator.min_length;
+    let stroke = actuator.max_length_m - actuator.min_length_m;
     for leg in 0..6 {
         let index = leg as u32 + 1;
-        let output = ends(|input| input.measurement.as_mut().unwrap().length[leg] -= 0.05);
+        let output = ends(|input| input.measurement.as_mut().unwrap().length_m[leg] -= 0.05);
         // One and a half times the greatest rate for a cycle, and a thousandth of the stroke.
-        let furthest = 1.5 * actuator.max_rate * 1e-3 + 1e-3 * stroke;
+        let furthest = 1.5 * actuator.max_rate_m_s * 1e-3 + 1e-3 * stroke;
         assert_evidence(&output, DiagnosticCode::MeasurementJumped, 0.05, furthest, index);
-        let output = ends(|input| input.measurement.as_mut().unwrap().length[leg] = 3.0);
+        let output = ends(|input| input.measurement.as_mut().unwrap().length_m[leg] = 3.0);
         assert_evidence(
             &output,
             DiagnosticCode::LengthOutOfStroke,
             3.0,
-            actuator.max_length + 0.02 * stroke,
+            actuator.max_length_m + 0.02 * stroke,
             index,
         );
-        let output = ends(|input| input.measurement.as_mut().unwrap().length[leg] = 0.5);
+        let output = ends(|input| input.measurement.as_mut().unwrap().length_m[leg] = 0.5);
         assert_evidence(
             &output,
             DiagnosticCode::LengthOutOfStroke,
             0.5,
-            actuator.min_length - 0.02 * stroke,
+            actuator.min_length_m - 0.02 * stroke,
             index,
         );
-        let output = ends(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[leg] = 1.0);
-        assert_evidence(&output, DiagnosticCode::RateJumped, 1.0, 0.05 + 0.02 * actuator.max_rate, index);
+        let output = ends(|input| input.measurement.as_mut().unwrap().rate_m_s.as_mut().unwrap()[leg] = 1.0);
+        assert_evidence(&output, DiagnosticCode::RateJumped, 1.0, 0.05 + 0.02 * actuator.max_rate_m_s, index);
         // Half the jump of rates that would be seen at once is seen by the lengths that do not follow.
-        let output = ends(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[leg] = 0.03);
+        let output = ends(|input| input.measurement.as_mut().unwrap().rate_m_s.as_mut().unwrap()[leg] = 0.03);
         assert_eq!(
             (output.diagnostic.code, output.diagnostic.index),
             (DiagnosticCode::RateInconsistent, index)
@@ -130,8 +130,8 @@ fn setpoints_are_refused_with_axis_or_leg_and_share_of_the_limit() {
     assert_evidence(&output, DiagnosticCode::SetpointJumped, 2.5, 1.0, 0);
     // X' counts as the distance that it is worth to the law: 0.2 m/s over wn.
     let parameters = parameters(&deployed("motion_base"));
-    let distance = 0.2 / parameters.law.position.stiffness.sqrt();
-    let ratio = distance / parameters.engage_position;
+    let distance = 0.2 / parameters.law.position.kp_per_s2.sqrt();
+    let ratio = distance / parameters.engage_position_m;
     assert_evidence(&task(|task| task.xd[5] = 0.2), DiagnosticCode::SetpointJumped, ratio, 1.0, 0);
     let kind = |kind| ends(|input| input.setpoint.as_mut().unwrap().kind = kind);
     for unknown in [SetpointKind::Unknown, SetpointKind::Pose] {

@@ -20,7 +20,7 @@ fn play(read: Reading, noise_m: f64, is_measured: bool) -> (Option<Output>, f64)
     let machine = &config.machine;
     let mut rig = Rig::new(&config, machine);
     let scene = fit(machine, BuiltInMotion::Sines, 8.0);
-    let home_length = rig.simulator().leg_motion().length;
+    let home_length = rig.simulator().leg_motion().length_m;
     let mut farthest = 0.0_f64;
     for k in 0..7000_u32 {
         let task = if k < 1000 {
@@ -31,10 +31,10 @@ fn play(read: Reading, noise_m: f64, is_measured: bool) -> (Option<Output>, f64)
         let mut input: Input = rig.input(&task);
         let state = *rig.simulator().state();
         let measurement = input.measurement.as_mut().unwrap();
-        for (leg, length) in measurement.length.iter_mut().enumerate() {
+        for (leg, length) in measurement.length_m.iter_mut().enumerate() {
             *length = read(leg, *length, home_length[leg]);
         }
-        measurement.rate = None;
+        measurement.rate_m_s = None;
         let mut x = task_coordinates(&state.pose, &machine.home);
         x[3] += noise_m * f64::from(k % 3).mul_add(1.0, -1.0);
         measurement.pose = is_measured.then_some(x);

@@ -43,22 +43,22 @@ fn episode(seed: u64, duration_s: f64) -> Result<(), String> {
             "[drive]\ndelay_us = {delay_us}\n[measured]\nlength_noise_m = {noise:e}\nlength_step_m = {step:e}"
         ),
     );
-    let most = config.machine.actuator.max_force;
-    config.machine.actuator.coulomb_friction = [modelled * most; 6];
+    let most = config.machine.actuator.max_force_n;
+    config.machine.actuator.coulomb_friction_n = [modelled * most; 6];
     let mut platform = config.machine.clone();
-    platform.actuator.coulomb_friction = [0.0; 6];
+    platform.actuator.coulomb_friction_n = [0.0; 6];
     let imperfections = Imperfections {
         seed,
         drive: DriveErrors { dead_time_ns: (1e3 * (delay_us - 100.0)) as u64, ..DriveErrors::default() },
         friction: Friction {
-            coulomb: modelled * friction * most,
-            stiction: stiction * most,
+            coulomb_n: modelled * friction * most,
+            stiction_n: stiction * most,
             ..Friction::default()
         },
-        sensor: SensorErrors { length_step: step, length_noise: noise, ..SensorErrors::default() },
+        sensor: SensorErrors { length_step_m: step, length_noise_m: noise, ..SensorErrors::default() },
         build: BuildErrors {
-            payload: between(-0.2, 0.2) * platform.platform.mass,
-            payload_at: platform.platform.center_of_mass,
+            payload_kg: between(-0.2, 0.2) * platform.platform.mass_kg,
+            payload_at_m: platform.platform.center_of_mass_m,
             ..BuildErrors::default()
         },
         ..Imperfections::default()

@@ -24,11 +24,11 @@ const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 fn sensitive(name: &str, mode: ControlMode, acceleration: f64) -> Config {
     let mut config = deployed(name);
     // No gravity: in a mode without the model nothing else holds the platform up.
-    config.machine.gravity.fill(0.0);
+    config.machine.gravity_m_s2.fill(0.0);
     config.deployment.control.mode = mode;
-    config.machine.actuator.max_force = 1e9;
+    config.machine.actuator.max_force_n = 1e9;
     // No force for the estimated velocity, which the shoves of these tests have not.
-    (config.machine.actuator.viscous_friction, config.machine.actuator.coulomb_friction) =
+    (config.machine.actuator.viscous_friction_n_s_m, config.machine.actuator.coulomb_friction_n) =
         ([0.0; 6], [0.0; 6]);
     let limits = &mut config.deployment.limits;
     limits.force_rate_n_s = 1e12;
@@ -56,7 +56,7 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
     for name in MACHINES {
         let config = sensitive(name, ControlMode::ComputedTorque, 0.016);
         let (rig, home, parameters) = at_home(&config);
-        let radius = config.machine.joints.radius.min(1.0);
+        let radius = config.machine.joints.radius_m.min(1.0);
         let dynamics = ForwardDynamics::new(&config.machine);
         let mut saturated = [0; 2];
         for _ in 0..200 {
@@ -70,7 +70,7 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
             let output = rig.controller.step(&rig.input(&home));
             assert_eq!(output.state, State::Active, "{name}: {:?}", output.diagnostic);
             let pose = rig.simulator().state().pose;
-            let found = dynamics.acceleration(&pose, &Twist::default(), &output.force).unwrap();
+            let found = dynamics.acceleration(&pose, &Twist::default(), &output.command_n).unwrap();
             let error = pose.displacement_to(&home.motion().pose).vector();
             let wanted = Acceleration::from_vector(&answer(&config, &error));
             let limits = &parameters.limits;
@@ -95,13 +95,13 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
 #[test]
 fn reference_and_feedback_together_end_at_the_bound() {
     let mut config = deployed("motion_base");
-    config.machine.actuator.max_force = 1e9;
+    config.machine.actuator.max_force_n = 1e9;
     let limits = &mut config.deployment.limits;
     (limits.force_rate_n_s, limits.feedback_scale) = (1e12, 0.1);
     limits.reference.position.acceleration = 1.0;
     // A platform lighter than the controller thinks: feedback pushes down, the reference goes either way.
     let mut light = config.machine.clone();
-    light.platform.mass *= 0.93;
+    light.platform.mass_kg *= 0.93;
     let (parameters, home) = (parameters(&config), TaskState::at_rest(config.machine.home));
     let bound = (1.0 + parameters.feedback_scale) * parameters.limits.position.acceleration;
     let mut rig = Rig::new(&config, &light);
@@ -126,7 +126,7 @@ fn reference_and_feedback_together_end_at_the_bound() {
         let output = rig.cycle(&input);
         assert_eq!(output.state, State::Active, "{cycle}: {:?}", output.diagnostic);
         if let Some(reference) = before.and_then(|before: Output| before.reference) {
-            let found = dynamics.acceleration(&measured.0, &measured.1, &output.force).unwrap().linear.z;
+            let found = dynamics.acceleration(&measured.0, &measured.1, &output.command_n).unwrap().linear.z;
             let desired =
                 0.5 * (reference.acceleration.linear.z + output.reference.unwrap().acceleration.linear.z);
             most = most.max(found.abs());
@@ -159,31 +159,31 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
         let limit =
             parameters.limits.position.acceleration + arm * parameters.limits.orientation.acceleration;
         let bounds = law
-            .max_compensated_disturbance
+            .max_compensated_acceleration
             .map(|saturation| (1.0 + parameters.feedback_scale) * limit + saturation);
-        let mass = law.leg_masses.mass;
+        let mass = law.leg_masses.mass_kg;
         let still = rig.input(&home);
         // What the model commands without feedback.
         let own = {
             let length = hexad::model::inverse_geometry::leg_lengths(&config.machine, &home.motion().pose);
             let measured = still.measurement.unwrap();
-            let wanted = answer(&config, &(Vector6::from(length) - Vector6::from(measured.length)));
-            Vector6::from(rig.controller.clone().step(&still).force) - wanted.component_mul(&mass)
+            let wanted = answer(&config, &(Vector6::from(length) - Vector6::from(measured.length_m)));
+            Vector6::from(rig.controller.clone().step(&still).command_n) - wanted.component_mul(&mass)
         };
         let mut saturated = 0;
         for push in 0..60 {
             let mut input = still;
             let measured = input.measurement.as_mut().unwrap();
-            for (leg, length) in measured.length.iter_mut().enumerate() {
+            for (leg, length) in measured.length_m.iter_mut().enumerate() {
                 *length += 1e-6 * f64::from(push) * (f64::from(push) * 0.7 + leg as f64 * 1.9).sin();
             }
             let desired = hexad::model::inverse_geometry::leg_lengths(&config.machine, &home.motion().pose);
-            let wanted = answer(&config, &(Vector6::from(desired) - Vector6::from(measured.length)));
+            let wanted = answer(&config, &(Vector6::from(desired) - Vector6::from(measured.length_m)));
             let excess = wanted.component_div(&bounds).amax().max(1.0);
             saturated += u32::from(excess > 1.0);
             let output = rig.controller.clone().step(&input);
             assert_eq!(output.state, State::Active, "{name} {}: {:?}", mode.name(), output.diagnostic);
-            let found = (Vector6::from(output.force) - own).component_div(&mass);
+            let found = (Vector6::from(output.command_n) - own).component_div(&mass);
             let apart = (found - wanted / excess).amax() / bounds.amax();
             assert!(apart < 1e-3, "{name} {}: {found:?}, not {:?}", mode.name(), wanted / excess);
         }
@@ -222,17 +222,17 @@ fn held(free_after: u32) -> (u32, Output, TrueMotion, Parameters) {
         // A sensor that is alive: what is held is the platform.
         let mut input = rig.input(&task);
         let measured = input.measurement.as_mut().unwrap();
-        measured.length.iter_mut().for_each(|length| *length += 1e-9 * f64::from(cycle % 2));
+        measured.length_m.iter_mut().for_each(|length| *length += 1e-9 * f64::from(cycle % 2));
         let output = rig.controller.step(&input);
         if !matches!(output.state, State::Active) {
             return (saturated, output, felt, parameters);
         }
         let pose = rig.simulator().state().pose;
-        let found = dynamics.acceleration(&pose, &Twist::default(), &output.force).unwrap().linear.norm();
+        let found = dynamics.acceleration(&pose, &Twist::default(), &output.command_n).unwrap().linear.norm();
         // The reference has no acceleration any more.
         saturated += u32::from((found / bound - 1.0).abs() < 0.01 && t > ramp);
         let is_held = saturated < free_after;
-        rig.pass(Some(output.force).filter(|_| !is_held));
+        rig.pass(Some(output.command_n).filter(|_| !is_held));
         felt.observe(&rig);
         last = output;
     }

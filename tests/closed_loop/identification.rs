@@ -32,12 +32,12 @@ const PAYLOAD: (f64, [f64; 3]) = (150.0, [-0.25, 0.1, 0.9]);
 /// Plays a motion on a platform. What was recorded, and the RMS position error of the true platform from the reference's
 /// setpoints.
 fn played(config: &Config, platform: &Machine, motion: &Trajectory, seed: u64) -> (RecordedStretch, f64) {
-    let most = config.machine.actuator.max_force;
+    let most = config.machine.actuator.max_force_n;
     let imperfections = Imperfections {
         seed,
-        sensor: SensorErrors { length_noise: 2e-6, ..SensorErrors::default() },
-        drive: DriveErrors { force_step: 1.0, ..DriveErrors::default() },
-        friction: Friction { stiction: 0.002 * most, ..Friction::default() },
+        sensor: SensorErrors { length_noise_m: 2e-6, ..SensorErrors::default() },
+        drive: DriveErrors { force_step_n: 1.0, ..DriveErrors::default() },
+        friction: Friction { stiction_n: 0.002 * most, ..Friction::default() },
         ..Imperfections::default()
     };
     let mut control = Rig::imperfect(config, platform, &imperfections);
@@ -65,8 +65,8 @@ fn moments(machine: &Machine) -> (f64, Vector3<f64>) {
     let joints: Vector3<f64> = machine.joints.triples.unpack_vectors(&machine.joints.platform).iter().sum();
     let platform = &machine.platform;
     (
-        platform.mass + 6.0 * machine.rod.mass,
-        platform.center_of_mass * platform.mass + joints * machine.rod.mass,
+        platform.mass_kg + 6.0 * machine.rod.mass_kg,
+        platform.center_of_mass_m * platform.mass_kg + joints * machine.rod.mass_kg,
     )
 }
 
@@ -95,8 +95,8 @@ fn errors(found: &Identification, truth: &Machine) -> [(f64, f64); 5] {
                 })
                 .collect(),
         ),
-        legs(|machine| &machine.actuator.viscous_friction, 0.03),
-        legs(|machine| &machine.actuator.coulomb_friction, 0.03),
+        legs(|machine| &machine.actuator.viscous_friction_n_s_m, 0.03),
+        legs(|machine| &machine.actuator.coulomb_friction_n, 0.03),
         legs(|machine| &machine.actuator.force_scale, 1e-3),
     ]
 }
@@ -109,7 +109,7 @@ fn certificate_machines_are_identified() {
     let excitation =
         Trajectory::Excitation(Box::new(Trajectory::excitation(&config, PERIODS, AMPLITUDE, 1).unwrap()));
     let circle = Trajectory::built_in(&config, BuiltInMotion::Circle, 10.0).unwrap();
-    let weight = (WEIGHT_RATIO * file.platform.mass, WEIGHT_AT);
+    let weight = (WEIGHT_RATIO * file.platform.mass_kg, WEIGHT_AT);
     let certificate = Certificate::new("identification", 1, 200);
     let seed = certificate.seed();
     let outside: usize = (0..certificate.total()).into_par_iter().map(|trial| {
@@ -119,21 +119,21 @@ fn certificate_machines_are_identified() {
             .map(|platform| played(&config, &platform, &excitation, seed + trial).0);
         let delay_s = SENDING / 1000.0;
         let run = |stretch: &RecordedStretch, load| Run { samples: samples(stretch, delay_s), load };
-        let known = Load::Known { mass: weight.0, at: weight.1 };
+        let known = Load::Known { mass_kg: weight.0, at_m: weight.1 };
         let runs = [run(&empty, Load::Empty), run(&with_weight, known), run(&with_payload, Load::Payload)];
         let found = identify(file, &runs, false).unwrap();
         // The delay of the drives shows once masses and friction do, as in `hexad identify`.
         let mut forces = empty.clone();
         for sent in &mut forces.sent {
-            sent.force.iter_mut().zip(found.machine.actuator.force_scale).for_each(|(force, scale)| *force *= scale);
+            sent.force_n.iter_mut().zip(found.machine.actuator.force_scale).for_each(|(force, scale)| *force *= scale);
         }
         let delay = drive_delay(&found.machine, &[forces]).unwrap().mean;
         println!("{trial}: {delay:?}");
         assert!((delay.delay_s - delay_s).abs() < 3e-4, "{trial}: {delay:?}");
 
         let errors = errors(&found, &truth);
-        let payload = found.estimate(|_, payload| payload.mass);
-        let place: [_; 3] = core::array::from_fn(|axis| found.estimate(|_, payload| payload.center_of_mass[axis]));
+        let payload = found.estimate(|_, payload| payload.mass_kg);
+        let place: [_; 3] = core::array::from_fn(|axis| found.estimate(|_, payload| payload.center_of_mass_m[axis]));
         let off: [f64; 3] = core::array::from_fn(|axis| (place[axis].value - PAYLOAD.1[axis]).abs());
         println!("{trial}: errors over bounds and deviations {errors:.2?}; payload {payload:?}, off {off:.5?} m");
         assert!(errors.iter().all(|(share, _)| *share < 1.0), "{trial}: {errors:?}");
@@ -148,7 +148,7 @@ fn certificate_machines_are_identified() {
         let [(_, by_file), (unused, by_exact), (_, by_identified)] =
             [&config, &exact, &identified].map(|config| played(config, &truth, &circle, seed + trial));
         let unused = [run(&unused, Load::Empty)];
-        let peak = unused[0].samples.iter().map(|sample| largest(&sample.command)).fold(0.0, f64::max);
+        let peak = unused[0].samples.iter().map(|sample| largest(&sample.command_n)).fold(0.0, f64::max);
         let [before, after] = [file, &found.machine].map(|machine| {
             prediction_errors(machine, &unused).iter().map(|[rms, _]| *rms).fold(0.0, f64::max)
         });
@@ -183,9 +183,9 @@ fn a_gentle_motion_shows_a_payload() {
         .collect();
     for run in runs {
         let found = identify(machine, &[run], true).unwrap();
-        let mass = found.estimate(|_, payload| payload.mass);
+        let mass = found.estimate(|_, payload| payload.mass_kg);
         let place: [_; 3] =
-            core::array::from_fn(|axis| found.estimate(|_, payload| payload.center_of_mass[axis]));
+            core::array::from_fn(|axis| found.estimate(|_, payload| payload.center_of_mass_m[axis]));
         let off: [f64; 3] = core::array::from_fn(|axis| place[axis].value - PAYLOAD.1[axis]);
         println!("mass {mass:?}, off {off:.5?}, deviations {:.5?}", place.map(|each| each.deviation));
         assert!((mass.value / PAYLOAD.0 - 1.0).abs() < 5e-3, "{mass:?}");

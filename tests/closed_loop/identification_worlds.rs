@@ -54,22 +54,22 @@ fn played_in(
     seed: u64,
 ) -> RecordedStretch {
     let mut random = Random::new(seed);
-    let (most, mut platform) = (config.machine.actuator.max_force, truth.clone());
+    let (most, mut platform) = (config.machine.actuator.max_force_n, truth.clone());
     let mut imperfections = Imperfections {
         seed,
-        sensor: SensorErrors { length_noise: 2e-6, ..SensorErrors::default() },
-        drive: DriveErrors { force_step: 1.0, ..DriveErrors::default() },
+        sensor: SensorErrors { length_noise_m: 2e-6, ..SensorErrors::default() },
+        drive: DriveErrors { force_step_n: 1.0, ..DriveErrors::default() },
         ..Imperfections::default()
     };
     let turn = core::f64::consts::TAU * random.signed();
     match world {
         World::Gravity(degrees) => {
             let axis = Vector3::new(turn.cos(), turn.sin(), 0.0) * degrees.to_radians();
-            platform.gravity = Rotation3::new(axis) * platform.gravity;
+            platform.gravity_m_s2 = Rotation3::new(axis) * platform.gravity_m_s2;
         }
-        World::Joints(joints) => imperfections.build = BuildErrors { joints, ..BuildErrors::default() },
+        World::Joints(joints) => imperfections.build = BuildErrors { joint_deviation_m: joints, ..BuildErrors::default() },
         World::Stiction(share) => {
-            imperfections.friction = Friction { stiction: share * most, ..Friction::default() };
+            imperfections.friction = Friction { stiction_n: share * most, ..Friction::default() };
         }
         _ => {}
     }
@@ -80,7 +80,7 @@ fn played_in(
         let t = rig.time_s() - 1.0;
         let state = if t < 0.0 { TaskState::at_rest(config.machine.home) } else { motion.at(t) };
         let mut input = rig.waiting_input(&state);
-        let length = &mut input.measurement.as_mut().unwrap().length;
+        let length = &mut input.measurement.as_mut().unwrap().length_m;
         match world {
             World::SensorScale(error) => length[leg] *= 1.0 + error,
             World::Backlash(play) => {
@@ -122,13 +122,13 @@ fn alter(world: World, truth: &Machine, stretch: &mut RecordedStretch) {
             World::ElasticBase(tilt) => {
                 let legs = forces(truth, motion).into_iter().zip(leg_directions(truth, &motion.pose));
                 let moment: Vector3<f64> = legs.zip(&bases).map(|((f, n), a)| a.cross(&(n * f))).sum();
-                let most = truth.actuator.max_force * truth.joints.radius;
+                let most = truth.actuator.max_force_n * truth.joints.radius_m;
                 let axis = Vector3::new(moment.x, moment.y, 0.0) * (tilt / most);
-                machine.gravity = Rotation3::new(axis) * truth.gravity;
+                machine.gravity_m_s2 = Rotation3::new(axis) * truth.gravity_m_s2;
             }
             World::LoosePayload(share) => {
-                let mass = share * truth.platform.mass;
-                let proper = motion.pose.rotation.transpose() * (motion.acceleration.linear - truth.gravity);
+                let mass = share * truth.platform.mass_kg;
+                let proper = motion.pose.rotation.transpose() * (motion.acceleration.linear - truth.gravity_m_s2);
                 // It sticks up to a slope of 5 %, and slides slowly to its stop beyond.
                 for axis in 0..2 {
                     if proper[axis].abs() > 0.05 * proper.z {
@@ -141,7 +141,7 @@ fn alter(world: World, truth: &Machine, stretch: &mut RecordedStretch) {
             _ => return,
         }
         let pairs = commands(&machine, motion).into_iter().zip(commands(truth, motion));
-        sent.force.iter_mut().zip(pairs).for_each(|(force, (with, without))| *force += with - without);
+        sent.force_n.iter_mut().zip(pairs).for_each(|(force, (with, without))| *force += with - without);
     }
 }
 
@@ -152,17 +152,17 @@ fn identified_in(world: World, config: &Config, seed: u64) -> (usize, usize, Exa
     let excitation =
         Trajectory::Excitation(Box::new(Trajectory::excitation(config, 6, amplitude, 1).unwrap()));
     let truth = drawn(file, &mut Random::new(seed));
-    let (mass, at) = (0.15 * file.platform.mass, [0.3, -0.2, 0.8]);
+    let (mass, at) = (0.15 * file.platform.mass_kg, [0.3, -0.2, 0.8]);
     let [empty, heavy] = [truth.clone(), loaded(&truth, mass, Vector3::from(at))]
         .map(|platform| played_in(world, config, &platform, &excitation, seed));
     let runs = |delay_s: f64| {
-        [(&empty, Load::Empty), (&heavy, Load::Known { mass, at })]
+        [(&empty, Load::Empty), (&heavy, Load::Known { mass_kg: mass, at_m: at })]
             .map(|(stretch, load)| Run { samples: samples(stretch, delay_s), load })
     };
     let first = identify(file, &runs(SENDING / 1000.0), false).unwrap();
     let mut forces = empty.clone();
     for sent in &mut forces.sent {
-        sent.force
+        sent.force_n
             .iter_mut()
             .zip(first.machine.actuator.force_scale)
             .for_each(|(force, scale)| *force *= scale);

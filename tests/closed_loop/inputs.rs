@@ -18,7 +18,7 @@ use hexad_support::{deployed, largest};
 pub fn assert_without_force(output: &Output, state: State, cause: DiagnosticCode) {
     assert_eq!((output.state, output.diagnostic.code), (state, cause));
     assert!(!state.has_control());
-    assert_eq!(output.force.map(f64::to_bits), [0; 6]);
+    assert_eq!(output.command_n.map(f64::to_bits), [0; 6]);
     assert!(!output.active_limits.contains(Limit::Force) && !output.active_limits.contains(Limit::ForceRate));
 }
 
@@ -59,11 +59,11 @@ fn without_messages_the_controller_is_off() {
 fn control_begins_only_near_the_setpoint() {
     let config = deployed("fried2008");
     let parameters = parameters(&config);
-    let (turn, way) = (parameters.engage_orientation, parameters.engage_position);
+    let (turn, way) = (parameters.engage_orientation_rad, parameters.engage_position_m);
     for (axis, tolerance) in [turn, turn, turn, way, way, way].into_iter().enumerate() {
         // An error of velocity counts as the error of pose that it is worth to the law.
         let law = &parameters.law;
-        let wn = if axis < 3 { law.orientation.stiffness } else { law.position.stiffness }.sqrt();
+        let wn = if axis < 3 { law.orientation.kp_per_s2 } else { law.position.kp_per_s2 }.sqrt();
         for (is_rate, sign) in [(false, 1.0), (false, -1.0), (true, 1.0), (true, -1.0)] {
             let setpoint = |share: f64| {
                 let mut task = TaskState::at_rest(config.machine.home);
@@ -111,7 +111,7 @@ fn wrong(change: impl Fn(&mut Input)) {
     let waited = [output.missed_measurements, output.missed_setpoints];
     // The one message does not count.
     assert_eq!(waited[0] + waited[1], 1 + undisturbed.missed_measurements + undisturbed.missed_setpoints);
-    for (force, should) in output.force.iter().zip(undisturbed.force) {
+    for (force, should) in output.command_n.iter().zip(undisturbed.command_n) {
         // It goes on with what was good a millisecond ago.
         assert!((force - should).abs() < 0.1, "{force} instead of {should}");
     }
@@ -123,8 +123,8 @@ fn wrong(change: impl Fn(&mut Input)) {
 fn one_number_that_is_not_finite_is_ridden_through_wherever_it_stands() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for k in 0..6 {
-            wrong(|input| input.measurement.as_mut().unwrap().length[k] = value);
-            wrong(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[k] = value);
+            wrong(|input| input.measurement.as_mut().unwrap().length_m[k] = value);
+            wrong(|input| input.measurement.as_mut().unwrap().rate_m_s.as_mut().unwrap()[k] = value);
             wrong(|input| input.setpoint.as_mut().unwrap().task.x[k] = value);
             wrong(|input| input.setpoint.as_mut().unwrap().task.xd[k] = value);
             wrong(|input| input.setpoint.as_mut().unwrap().task.xdd[k] = value);
@@ -137,8 +137,8 @@ fn one_number_that_is_not_finite_is_ridden_through_wherever_it_stands() {
 fn one_message_far_away_is_ridden_through() {
     for away in [0.05, 1.0, 1e3, 1e100, 1e300, f64::MAX, -1.0, -1e300] {
         for k in 0..6 {
-            wrong(|input| input.measurement.as_mut().unwrap().length[k] += away);
-            wrong(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[k] += 20.0 * away);
+            wrong(|input| input.measurement.as_mut().unwrap().length_m[k] += away);
+            wrong(|input| input.measurement.as_mut().unwrap().rate_m_s.as_mut().unwrap()[k] += 20.0 * away);
             wrong(|input| input.setpoint.as_mut().unwrap().task.x[k] += away);
             wrong(|input| input.setpoint.as_mut().unwrap().task.xd[k] += 10.0 * away);
             // Beyond the limit of acceleration, and above beyond the tolerance; what is within is followed, see below.
@@ -210,7 +210,7 @@ fn a_message_counts_until_it_is_as_old_as_its_timeout() {
         }
         let (mut rig, task) = in_motion(&config);
         let mut input = rig.input(&task);
-        let force = rig.controller.step(&input).force;
+        let force = rig.controller.step(&input).command_n;
         let begin_ns = rig.now_ns;
         input.release_ns = begin_ns + age_ns;
         if of_setpoint {
@@ -251,7 +251,7 @@ fn the_last_cycle_of_all_is_a_cycle() {
     let mut controller = Controller::new(&config.machine, parameters(&config));
     let output = controller.step(&input);
     assert_eq!(output.state, State::Engaging);
-    assert!(largest(&output.force) > 1.0);
+    assert!(largest(&output.command_n) > 1.0);
 }
 
 /// The lengths are then further away than one trusted step of forward kinematics.
@@ -269,7 +269,7 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
         if k < 150 {
             input.measurement = Some(stale);
         } else {
-            furthest = (0..6).fold(0.0, |most, leg| most.max((fresh.length[leg] - stale.length[leg]).abs()));
+            furthest = (0..6).fold(0.0, |most, leg| most.max((fresh.length_m[leg] - stale.length_m[leg]).abs()));
         }
         let output = rig.cycle(&input);
         assert_eq!(
@@ -280,7 +280,7 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
         );
     }
     let kinematic_state = KinematicState::new(&config.machine, rig.simulator().state().pose);
-    let trusted = kinematic_state.sensitivity().trusted_step * config.machine.joints.radius;
+    let trusted = kinematic_state.sensitivity().trusted_step * config.machine.joints.radius_m;
     assert!(furthest > 1.5 * trusted, "{furthest} m of {trusted} m");
 }
 

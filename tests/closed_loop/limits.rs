@@ -29,16 +29,16 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
         config.deployment.control.following_orientation_rad = f64::INFINITY;
         config.deployment.control.following_velocity_m_s = f64::INFINITY;
         config.deployment.control.following_velocity_rad_s = f64::INFINITY;
-        let limit = config.machine.actuator.max_force;
+        let limit = config.machine.actuator.max_force_n;
         let mut platform = config.machine.clone();
-        platform.platform.mass *= 5.0;
-        platform.platform.center_of_mass.x += config.machine.joints.radius;
+        platform.platform.mass_kg *= 5.0;
+        platform.platform.center_of_mass_m.x += config.machine.joints.radius_m;
         let mut rig = Rig::new(&config, &platform);
         let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
         rig.play(&scene, |_, output| {
-            assert!(largest(&output.force) <= limit, "{name}: {:?}", output.force);
-            limited += u32::from(largest(&output.force) > limit * (1.0 - 1e-9));
-            assert!(output.state.has_control() || output.force == [0.0; LEGS]);
+            assert!(largest(&output.command_n) <= limit, "{name}: {:?}", output.command_n);
+            limited += u32::from(largest(&output.command_n) > limit * (1.0 - 1e-9));
+            assert!(output.state.has_control() || output.command_n == [0.0; LEGS]);
         });
     }
     assert!(limited > 100, "{limited}");
@@ -48,7 +48,7 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
 #[test]
 fn noise_gets_no_more_than_the_limit() {
     let config = deployed("fried2008");
-    let limit = config.machine.actuator.max_force;
+    let limit = config.machine.actuator.max_force_n;
     let mut seed = 2008_u64;
     let mut random = || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -62,11 +62,11 @@ fn noise_gets_no_more_than_the_limit() {
         for _ in 0..100 {
             let mut input = rig.input(&task);
             let measurement = input.measurement.as_mut().unwrap();
-            measurement.length.iter_mut().for_each(|length| *length += size * random());
-            measurement.rate.as_mut().unwrap().iter_mut().for_each(|rate| *rate += 100.0 * size * random());
+            measurement.length_m.iter_mut().for_each(|length| *length += size * random());
+            measurement.rate_m_s.as_mut().unwrap().iter_mut().for_each(|rate| *rate += 100.0 * size * random());
             let output = rig.cycle(&input);
-            assert!(largest(&output.force) <= limit);
-            assert!(output.state.has_control() || output.force == [0.0; LEGS]);
+            assert!(largest(&output.command_n) <= limit);
+            assert!(output.state.has_control() || output.command_n == [0.0; LEGS]);
             active += u32::from(output.state.has_control());
         }
     }

@@ -34,7 +34,7 @@ fn in_mode(name: &str, mode: ControlMode, is_compensating: bool) -> Config {
 /// The fast scene on a platform whose mass is `share` of the modelled one, once control has settled.
 fn fast(config: &Config, share: f64) -> Tracking {
     let mut platform = config.machine.clone();
-    platform.platform.mass *= share;
+    platform.platform.mass_kg *= share;
     let scene = Fast::new(config);
     let mut rig = Rig::new(config, &platform);
     let home = scene.at(0.0);
@@ -115,7 +115,7 @@ fn compensated_a_payload_leaves_nothing_at_rest() {
             let [without, with] = [false, true].map(|is_compensating| {
                 let config = in_mode(name, mode, is_compensating);
                 let mut heavy = config.machine.clone();
-                heavy.platform.mass *= 1.2;
+                heavy.platform.mass_kg *= 1.2;
                 let mut rig = Rig::new(&config, &heavy);
                 let home = TaskState::at_rest(config.machine.home);
                 rig.engage(&home);
@@ -181,14 +181,14 @@ fn certificate_the_largest_bandwidth_is_stable_in_every_mode() {
                     mode.name(),
                     output.diagnostic.code
                 );
-                let answers = |leg: usize| holds[leg] + 1.25 * (output.force[leg] - holds[leg]);
+                let answers = |leg: usize| holds[leg] + 1.25 * (output.command_n[leg] - holds[leg]);
                 let mut force: [f64; 6] = core::array::from_fn(answers);
                 force[0] += push;
                 rig.pass(Some(force));
             }
             (rig.simulator().state().pose.position - settled).norm()
         };
-        let pushed = away(20, 0.01 * config.machine.actuator.max_force);
+        let pushed = away(20, 0.01 * config.machine.actuator.max_force_n);
         let left = away(2000, 0.0);
         println!("{name}, {}: to {largest} Hz, {pushed:e} m, {left:e} m are left", mode.name());
         assert!(pushed > 1e-7 && left < 1e-3 * pushed, "{name} {}: {left} of {pushed}", mode.name());
@@ -236,18 +236,18 @@ fn a_leg_pushes_for_its_own_error() {
     (0..1000).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
     let forces = |leg: usize, off: f64| {
         let mut input = rig.input(&home);
-        input.measurement.as_mut().unwrap().length[leg] += off;
-        rig.controller.clone().step(&input).force
+        input.measurement.as_mut().unwrap().length_m[leg] += off;
+        rig.controller.clone().step(&input).command_n
     };
     for leg in 0..6 {
         let (with, without) = (forces(leg, 1e-5), forces(leg, 0.0));
         for other in 0..6 {
             let answered = answer(&config, &Vector6::ith(leg, -1e-5))[other];
-            let expected = answered * law.leg_masses.mass[other];
+            let expected = answered * law.leg_masses.mass_kg[other];
             assert_eq!(answered == 0.0, other != leg);
             let found = with[other] - without[other];
             assert!(
-                (found - expected).abs() < 1e-6 * law.leg_masses.mass[leg],
+                (found - expected).abs() < 1e-6 * law.leg_masses.mass_kg[leg],
                 "{leg} {other}: {found} {expected}"
             );
         }

@@ -74,7 +74,7 @@ struct Turn {
 }
 
 fn turn(config: &Config, motion: &ToolMotion, vertex: impl Fn(&Pose) -> Vector3<f64>, seed: u64) -> Turn {
-    let sensor = SensorErrors { length_noise: 1e-7, ..SensorErrors::default() };
+    let sensor = SensorErrors { length_noise_m: 1e-7, ..SensorErrors::default() };
     let imperfections = Imperfections { seed, sensor, ..Imperfections::default() };
     let mut control = Rig::imperfect(config, &config.machine, &imperfections);
     let begin_s = SETTLING_S + MEAN_S;
@@ -116,7 +116,7 @@ fn turn(config: &Config, motion: &ToolMotion, vertex: impl Fn(&Pose) -> Vector3<
 fn a_mirror_turns_about_its_vertex() {
     for (coulomb_friction, speed) in [(0.0, 1.0), (40.0, 0.2)] {
         let mut config = mirror();
-        config.machine.actuator.coulomb_friction = [coulomb_friction; LEGS];
+        config.machine.actuator.coulomb_friction_n = [coulomb_friction; LEGS];
         let frames = config.frames_named(Some("vertex"), None).unwrap();
         let home = config.machine.home_pose();
         let constants = Constants::new(&config.machine, parameters(&config));

@@ -95,7 +95,7 @@ fn poses_beyond_the_stroke_are_approached_to_its_end() {
             }
             let room = ride.felt.largest.room;
             println!("{name} {axis} {sign}: {room:e} m left, {stroke} cycles at the stroke");
-            let is_condition = ride.felt.largest.condition > 0.8 * ride.parameters.condition;
+            let is_condition = ride.felt.largest.condition > 0.8 * ride.parameters.max_condition;
             let share = room / config.machine.actuator.stroke();
             assert!(
                 stroke > 1000 && share < 0.03 || is_condition,

@@ -21,7 +21,7 @@ fn a_pose_far_from_home_is_found_in_bounded_steps() {
     let length = leg_lengths(&config.machine, &task.motion().pose);
     let mut rig = Rig::new(&config, &config.machine);
     let mut input = rig.input(&task);
-    input.measurement.as_mut().unwrap().length = length;
+    input.measurement.as_mut().unwrap().length_m = length;
     let mut cycles = 0;
     while rig.controller.step(&input).state == State::Off {
         cycles += 1;
@@ -47,7 +47,7 @@ fn singular_poses_have_no_force() {
     let mut input = rig.input(&TaskState::default());
     for disturbance in [0.0, 1e-6, 1e-3, -1e-3] {
         let exact = leg_lengths(&config.machine, &flat);
-        input.measurement.as_mut().unwrap().length =
+        input.measurement.as_mut().unwrap().length_m =
             array::from_fn(|i| exact[i] + disturbance * (i as f64 - 2.2));
         let mut controller = Controller::new(&config.machine, parameters(&config));
         for _ in 0..3 {
@@ -69,7 +69,7 @@ fn lengths_no_platform_can_have_are_a_fault() {
     let config = deployed("fried2008");
     let mut rig = Rig::new(&config, &config.machine);
     let mut input = rig.input(&TaskState::at_rest(config.machine.home));
-    input.measurement.as_mut().unwrap().length = [1.59, 0.86, 0.86, 0.86, 0.86, 0.86];
+    input.measurement.as_mut().unwrap().length_m = [1.59, 0.86, 0.86, 0.86, 0.86, 0.86];
     let mut causes = Vec::new();
     for _ in 0..1000 {
         let output = rig.controller.step(&input);

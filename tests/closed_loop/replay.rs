@@ -27,7 +27,7 @@ fn recorded_inputs_give_the_same_outputs_bit_for_bit() {
         for (input, output) in &record {
             let again = fresh.step(input);
             assert_eq!(bits(&again), bits(output));
-            assert_eq!(again.force.map(f64::to_bits), output.force.map(f64::to_bits));
+            assert_eq!(again.command_n.map(f64::to_bits), output.command_n.map(f64::to_bits));
             assert_eq!(bits(&twin.step(input)), bits(output), "a clone is as good");
         }
     }

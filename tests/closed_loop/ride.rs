@@ -26,7 +26,7 @@ pub fn with_policy(name: &str, policy: ViolationPolicy) -> Config {
     let mut config = deployed(name);
     config.deployment.setpoint.on_violation = policy;
     // Drives that can do what the limits allow at once, in every pose: the subject is the motion.
-    config.machine.actuator.max_force *= 10.0;
+    config.machine.actuator.max_force_n *= 10.0;
     config
 }
 
@@ -105,7 +105,7 @@ impl Ride {
         assert!(within(acceleration, used[1], most), "{what}: acceleration {acceleration}");
         assert!(within(jerk, used[2], TRUE_JERK), "{what}: jerk {jerk}");
         assert!(
-            leg_rate <= 1.001 && condition <= self.parameters.condition,
+            leg_rate <= 1.001 && condition <= self.parameters.max_condition,
             "{what}: {leg_rate} {condition}"
         );
         // The platform may be beside its reference by some micrometres.

@@ -28,28 +28,28 @@ fn a_setpoint_is_checked_against_each_limit() {
             let mut fast = home;
             fast.xd[axis] = share * limits.velocity;
             let mut machine = config.machine.clone();
-            machine.actuator.max_rate = 1e3;
+            machine.actuator.max_rate_m_s = 1e3;
             assert_eq!(check(&machine, &wide, fast), result, "velocity {axis}");
-            let rates = leg_motion(&machine, &fast.motion()).rate;
-            machine.actuator.max_rate = rates.iter().fold(0.0_f64, |most, rate| most.max(rate.abs())) / share;
+            let rates = leg_motion(&machine, &fast.motion()).rate_m_s;
+            machine.actuator.max_rate_m_s = rates.iter().fold(0.0_f64, |most, rate| most.max(rate.abs())) / share;
             fast.xd[axis] *= 0.99 / share;
-            machine.actuator.max_rate *= 0.99 / share;
+            machine.actuator.max_rate_m_s *= 0.99 / share;
             assert_eq!(check(&machine, &wide, fast), result, "leg rate {axis}");
             let mut hard = home;
             hard.xdd[axis] = share * limits.acceleration;
             assert_eq!(check(&config.machine, &wide, hard), result, "acceleration {axis}");
         }
     }
-    let lengths = leg_motion(&config.machine, &home.motion()).length;
+    let lengths = leg_motion(&config.machine, &home.motion()).length_m;
     let longest = lengths.iter().fold(0.0_f64, |most, length| most.max(*length));
     let shortest = lengths.iter().fold(f64::INFINITY, |least, length| least.min(*length));
-    assert!(wide.stroke_margin > 1e-3);
+    assert!(wide.stroke_margin_m > 1e-3);
     for (share, result) in [(1.01, Ok(())), (0.99, Err(DiagnosticCode::SetpointOutOfReach))] {
         let mut machine = config.machine.clone();
-        machine.actuator.max_length = longest + share * wide.stroke_margin;
+        machine.actuator.max_length_m = longest + share * wide.stroke_margin_m;
         assert_eq!(check(&machine, &wide, home), result, "long {share}");
         let mut machine = config.machine.clone();
-        machine.actuator.min_length = shortest - share * wide.stroke_margin;
+        machine.actuator.min_length_m = shortest - share * wide.stroke_margin_m;
         assert_eq!(check(&machine, &wide, home), result, "short {share}");
     }
     // A range without width is kept by its one value.
@@ -89,7 +89,7 @@ fn a_setpoint_that_is_not_newer_is_refused() {
 fn a_jump_while_engaging_is_refused_beyond_the_tolerance() {
     let config = deployed("motion_base");
     let home = TaskState::at_rest(config.machine.home);
-    let tolerance = parameters(&config).engage_position;
+    let tolerance = parameters(&config).engage_position_m;
     for (share, missed) in [(0.99, 0), (1.01, 1)] {
         let mut rig = Rig::new(&config, &config.machine);
         let mut near = home;
@@ -109,7 +109,7 @@ fn a_jump_while_engaging_is_refused_beyond_the_tolerance() {
 fn the_reference_moves_from_the_second_cycle_under_control_on() {
     let config = deployed("motion_base");
     let mut near = TaskState::at_rest(config.machine.home);
-    near.x[3] += 0.5 * parameters(&config).engage_position;
+    near.x[3] += 0.5 * parameters(&config).engage_position_m;
     let mut rig = Rig::new(&config, &config.machine);
     rig.ask(Request::Engage);
     let [first, second] = [0; 2].map(|_| rig.cycle(&rig.input(&near)).reference.unwrap());

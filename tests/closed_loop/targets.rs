@@ -92,7 +92,7 @@ fn a_slow_platform_carries_an_unknown_payload_as_a_fast_one_does() {
         let mut config = with_policy("motion_base", ViolationPolicy::Stop);
         config.deployment.limits.scale = scale;
         let mut loaded = config.machine.clone();
-        loaded.platform.mass *= 1.15;
+        loaded.platform.mass_kg *= 1.15;
         let mut rig = Rig::new(&config, &loaded);
         let home = TaskState::at_rest(config.machine.home);
         rig.ask(Request::Engage);

@@ -59,7 +59,7 @@ fn within(found: &Errors, expected: [f64; 2], what: &str) -> bool {
 fn assert_tracks((name, motion, position, orientation): Expected, share: f64) -> Tracking {
     let config = deployed(name);
     let mut platform = config.machine.clone();
-    platform.platform.mass *= share;
+    platform.platform.mass_kg *= share;
     let tracking = track(&config, &platform, motion, SECONDS);
     println!("{name} {motion:?}, {share} of the mass");
     let well = [
@@ -119,7 +119,7 @@ fn within_period(before: &Motion, end: &Motion, period_s: f64) -> Motion {
 fn the_error_reported_is_the_error_made() {
     let config = deployed("fried2008");
     let mut platform = config.machine.clone();
-    platform.platform.mass *= 1.2;
+    platform.platform.mass_kg *= 1.2;
     let mut rig = Rig::new(&config, &platform);
     let scene = hexad::motion::built_in::fit(&config.machine, BuiltInMotion::Sines, 4.0);
     let [mut position, mut orientation, mut apart] = [Errors::default(); 3];
@@ -164,12 +164,12 @@ fn an_offset_decays_as_designed() {
             let sampled = SampledLoop {
                 wn_t: TAU * hertz * 1e-3,
                 estimator_ratio: control.estimator_bandwidth_hz / hertz,
-                known_delay: 0.6,
-                delay: 0.6,
+                known_delay_periods: 0.6,
+                delay_periods: 0.6,
                 ..SampledLoop::default()
             };
             let mut rig = Rig::new(&config, &config.machine);
-            let offset = 5e-5 * config.machine.joints.radius.min(1.0);
+            let offset = 5e-5 * config.machine.joints.radius_m.min(1.0);
             let task = TaskState::at_rest(config.machine.home);
             let wanted = task.motion().pose;
             rig.engage(&task);

@@ -25,11 +25,11 @@ fn stated_drives_cost_no_accuracy() {
         let ideal = deployed(name);
         let [mut scaled, mut screws, mut dry] = [ideal.clone(), ideal.clone(), ideal.clone()];
         scaled.machine.actuator.force_scale = FORCE_SCALE;
-        screws.machine.actuator.load_friction = LOAD_FRICTION;
+        screws.machine.actuator.load_friction_share = LOAD_FRICTION;
         // Friction of the same size that does not depend on the load, which is smoothed alike where a leg turns around.
         let home = TaskState::at_rest(ideal.machine.home).motion();
         let held = inverse_dynamics::<Gravity>(&ideal.machine, &home).unwrap();
-        dry.machine.actuator.coulomb_friction =
+        dry.machine.actuator.coulomb_friction_n =
             core::array::from_fn(|leg| LOAD_FRICTION[leg] * held[leg].abs());
         let [by_ideal, by_scaled, by_screws, by_dry] =
             [&ideal, &scaled, &screws, &dry].map(|config| tracked(config, config).position.rms());
@@ -37,7 +37,7 @@ fn stated_drives_cost_no_accuracy() {
             let mut slightly = ideal.clone();
             let (to, from) = (&mut slightly.machine.actuator, &platform.machine.actuator);
             to.force_scale = from.force_scale.map(|scale| 1.0 + 0.1 * (scale - 1.0));
-            to.load_friction = from.load_friction.map(|friction| 0.3 * friction);
+            to.load_friction_share = from.load_friction_share.map(|friction| 0.3 * friction);
             tracked(&ideal, &slightly).position.rms()
         });
         println!(

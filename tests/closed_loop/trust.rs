@@ -49,9 +49,9 @@ fn freeze(config: &Config, share: f64, legs: &[usize], noise: f64, from_s: f64) 
         (config.deployment.noise.length_m, config.deployment.noise.length_step_m) = (noise, 1e-6);
     }
     // The machine has no friction, and its file states that: a leg that sticks would look like a frozen sensor.
-    config.machine.actuator.friction_uncertainty = 0.0;
+    config.machine.actuator.friction_uncertainty_n = 0.0;
     let config = &config;
-    let sensor = SensorErrors { length_noise: noise, length_step: 1e-6, ..SensorErrors::default() };
+    let sensor = SensorErrors { length_noise_m: noise, length_step_m: 1e-6, ..SensorErrors::default() };
     let mut control = Rig::imperfect(
         config,
         &config.machine,
@@ -64,8 +64,8 @@ fn freeze(config: &Config, share: f64, legs: &[usize], noise: f64, from_s: f64) 
         let mut input = control.waiting_input(&task);
         if control.time_s() >= from_s {
             let measured = input.measurement.as_mut().unwrap();
-            let frozen = frozen.get_or_insert(measured.length);
-            legs.iter().for_each(|leg| measured.length[*leg] = frozen[*leg]);
+            let frozen = frozen.get_or_insert(measured.length_m);
+            legs.iter().for_each(|leg| measured.length_m[*leg] = frozen[*leg]);
             let apart = control.hardware.simulator().state().pose.position - task.motion().pose.position;
             farthest = farthest.max(apart.norm());
         }
@@ -113,7 +113,7 @@ fn certificate_sensors_that_freeze_in_motion_end_the_forces_before_the_platform_
         );
         assert!(legs.contains(&(output.diagnostic.index as usize - 1)) || legs.len() == 1);
         // One leg near its own turnaround is crawling, however fast the platform is: the others do not show its fault.
-        let rates = leg_motion(&config.machine, &scene(&config, share)(from_s).motion()).rate;
+        let rates = leg_motion(&config.machine, &scene(&config, share)(from_s).motion()).rate_m_s;
         let is_crawling = legs.len() == 1 && rates[legs[0]].abs() < CRAWLING_M_S;
         let bound = if is_crawling { 2e-3 } else { 0.5e-3 };
         assert!(farthest < bound, "{machine} {share} {legs:?}, {rates:?} m/s: {farthest} m");
@@ -123,12 +123,12 @@ fn certificate_sensors_that_freeze_in_motion_end_the_forces_before_the_platform_
 /// Largest distance from the pose at rest in the last second \[m\], after a motion; friction in the model and in the plant.
 fn settled(model: f64, plant: f64, stiction: f64) -> f64 {
     let mut config = config("motion_base");
-    let force = config.machine.actuator.max_force;
-    config.machine.actuator.coulomb_friction = [model * force; 6];
+    let force = config.machine.actuator.max_force_n;
+    config.machine.actuator.coulomb_friction_n = [model * force; 6];
     let mut platform = config.machine.clone();
-    platform.actuator.coulomb_friction = [0.0; 6];
+    platform.actuator.coulomb_friction_n = [0.0; 6];
     let mut imperfections = Imperfections::default();
-    (imperfections.friction.coulomb, imperfections.friction.stiction) = (plant * force, stiction * force);
+    (imperfections.friction.coulomb_n, imperfections.friction.stiction_n) = (plant * force, stiction * force);
     let mut control = Rig::imperfect(&config, &platform, &imperfections);
     // Up and across by 0.1 m within two seconds, with minimum jerk.
     let way = Vector6::new(0.0, 0.05, 0.0, 0.1, 0.0, 0.1);

@@ -33,7 +33,7 @@ fn episode(seed: u64) -> Result<(), String> {
     let mut random = Random::new(seed);
     let mut between = |least: f64, most: f64| least + (most - least) * random.uniform();
     let config = configured(machine, "");
-    let dry = between(0.0, 1.0) * config.machine.actuator.friction_uncertainty;
+    let dry = between(0.0, 1.0) * config.machine.actuator.friction_uncertainty_n;
     let (stiction, lag) = (between(0.0, 0.5), between(0.01, 0.99));
     let (delay_us, step) = (between(0.0, 3000.0).round(), 10.0_f64.powf(between(-8.0, -4.7)));
     let imperfections = Imperfections {
@@ -44,14 +44,14 @@ fn episode(seed: u64) -> Result<(), String> {
             ..DriveErrors::default()
         },
         friction: Friction {
-            coulomb: (1.0 - stiction) * dry,
-            stiction: stiction * dry,
-            stribeck_speed: 10.0_f64.powf(between(-3.3, -2.0)),
+            coulomb_n: (1.0 - stiction) * dry,
+            stiction_n: stiction * dry,
+            stribeck_speed_m_s: 10.0_f64.powf(between(-3.3, -2.0)),
             ..Friction::default()
         },
         sensor: SensorErrors {
-            length_step: step,
-            length_noise: 10.0_f64.powf(between(-8.0, -6.0)),
+            length_step_m: step,
+            length_noise_m: 10.0_f64.powf(between(-8.0, -6.0)),
             ..SensorErrors::default()
         },
         ..Imperfections::default()

@@ -32,7 +32,7 @@ fn machine(name: &str, policy: ViolationPolicy, holding: f64) -> Config {
     let forces =
         inverse_dynamics::<Gravity>(&config.machine, &TaskState::at_rest(config.machine.home).motion());
     let largest = forces.unwrap().into_iter().map(f64::abs).fold(0.0, f64::max);
-    config.machine.actuator.max_force = largest / holding;
+    config.machine.actuator.max_force_n = largest / holding;
     config.deployment.limits.reference.autonomous_scale = 1.0;
     config
 }
@@ -43,7 +43,7 @@ fn ride(run: u64, payload: f64) -> (DiagnosticCode, f64) {
     let (name, holding) = (MACHINES[run as usize / 2 % 3], HOLDING_AT_HOME[run as usize / 6 % 3]);
     let config = machine(name, policy, holding);
     let mut plant = config.machine.clone();
-    plant.platform.mass *= 1.0 + payload;
+    plant.platform.mass_kg *= 1.0 + payload;
     let mut rig = Rig::new(&config, &plant);
     let home = TaskState::at_rest(config.machine.home);
     rig.engage(&home);
@@ -74,8 +74,8 @@ fn ride(run: u64, payload: f64) -> (DiagnosticCode, f64) {
             if output.state != State::Active {
                 return (output.diagnostic.code, largest);
             }
-            let forces = output.force.into_iter().map(f64::abs).fold(0.0, f64::max);
-            largest = largest.max(forces / config.machine.actuator.max_force);
+            let forces = output.command_n.into_iter().map(f64::abs).fold(0.0, f64::max);
+            largest = largest.max(forces / config.machine.actuator.max_force_n);
         }
     }
     (DiagnosticCode::None, largest)

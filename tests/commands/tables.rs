@@ -24,8 +24,8 @@ pub fn moves(larger: f64) -> Vec<Vec<f64>> {
     let row = |k: u32| {
         let s = rise(SECONDS * f64::from(k) / 10.0, SECONDS);
         let mut row = vec![0.0; 19];
-        (row[0], row[4]) = (larger * SECONDS * f64::from(k) / 10.0, HOME + larger * WAY * s.value);
-        (row[10], row[16]) = (WAY * s.rate, WAY * s.accel / larger);
+        (row[0], row[4]) = (larger * SECONDS * f64::from(k) / 10.0, HOME + larger * WAY * s.value_share);
+        (row[10], row[16]) = (WAY * s.rate_per_s, WAY * s.accel_per_s2 / larger);
         row
     };
     (0..=10).map(row).collect()
@@ -36,7 +36,7 @@ pub fn poses(header: &str, separator: char, time_factor: f64, is_comma_decimal: 
     let mut text = format!("{header}\n");
     for k in 0..=30 {
         let t = SECONDS * f64::from(k) / 30.0;
-        let x_mm = 1e3 * (HOME + WAY * rise(t, SECONDS).value);
+        let x_mm = 1e3 * (HOME + WAY * rise(t, SECONDS).value_share);
         let row = [t * time_factor, x_mm, 0.0, 0.0, 0.0, 0.0, 0.0].map(|number| {
             let text = format!("{number}");
             if is_comma_decimal { text.replace('.', ",") } else { text }
@@ -65,8 +65,8 @@ fn a_file_is_the_motion_that_it_was_made_from() {
         assert!((read.duration() - SECONDS).abs() < 1e-9);
         for t in (0..=1500).map(|k| 1e-3 * f64::from(k)) {
             let (state, s) = (read.at(t), rise(t, SECONDS));
-            assert!((state.x[3] - HOME - WAY * s.value).abs() < tolerance * WAY, "{t}: {state:?}");
-            assert!((state.xd[3] - WAY * s.rate).abs() < 0.01 * 1.875 * WAY / SECONDS, "{t}: {state:?}");
+            assert!((state.x[3] - HOME - WAY * s.value_share).abs() < tolerance * WAY, "{t}: {state:?}");
+            assert!((state.xd[3] - WAY * s.rate_per_s).abs() < 0.01 * 1.875 * WAY / SECONDS, "{t}: {state:?}");
             assert!([0, 1, 2, 4, 5].iter().all(|axis| state.x[*axis] == 0.0), "{t}: {state:?}");
         }
     }

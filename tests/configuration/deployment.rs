@@ -109,7 +109,7 @@ fn fidelity_is_auto_or_a_rung_with_inertia() {
     for choice in &Fidelity::ALL[1..] {
         assert_eq!(fidelity(&format!("fidelity = \"{}\"", choice.name())), FidelityChoice::Fixed(*choice));
     }
-    assert_eq!(read("fidelity_tolerance = 1").deployment.control.fidelity_tolerance, 1.0);
+    assert_eq!(read("fidelity_tolerance = 1").deployment.control.fidelity_tolerance_share, 1.0);
     let names = "\"exact\", \"rigid-legs\", \"no-velocity\", \"lumped-legs\", \"massless-legs\", \"auto\"";
     let message = |value| format!("control.fidelity = {value}: must be one of {names}");
     refused_each(FRIED, ["\"gravity\"", "\"Exact\"", "\"\"", "1", "[\"auto\"]"].map(message));
@@ -136,7 +136,7 @@ fn the_cheapest_fidelity_within_the_tolerance_is_chosen_for_a_reason() {
         assert_eq!(fidelity(&config), choice, "{tolerance}");
         let model = InverseDynamics::new(&config.machine);
         let comparison = FidelityComparison::of_envelope(&model, &envelope(&config, &model));
-        let reason = reason(&comparison, config.deployment.control.fidelity_tolerance);
+        let reason = reason(&comparison, config.deployment.control.fidelity_tolerance_share);
         words.iter().for_each(|words| assert!(reason.contains(words), "{words:?} must be in {reason}"));
     }
 }

@@ -16,7 +16,7 @@ fn deployment(text: &str) -> Deployment {
 fn margin_of_home(text: &str) -> f64 {
     let machine = Config::parse(text, "test.toml").unwrap().machine;
     let lengths = leg_lengths(&machine, &machine.home_pose());
-    let (min, max) = (machine.actuator.min_length, machine.actuator.max_length);
+    let (min, max) = (machine.actuator.min_length_m, machine.actuator.max_length_m);
     lengths.iter().map(|length| (length - min).min(max - length)).fold(f64::INFINITY, f64::min)
 }
 
@@ -183,7 +183,7 @@ fn the_default_condition_is_less_at_slow_rates_and_leaves_room_around_home() {
         let largest = limits.condition;
         assert!(largest < 100.0 && largest >= 1.5 * at_home, "{rate_hz} Hz: {largest}, home {at_home}");
         // Growth in two periods, the 100 us of the I/O thread and half of the hold.
-        let exponent = limits.held_pole * (2.5 / rate_hz + 100e-6);
+        let exponent = limits.held_pole_per_s * (2.5 / rate_hz + 100e-6);
         assert!(exponent <= 0.2 || largest == 1.5 * at_home, "{rate_hz} Hz: {exponent}");
         largest
     });

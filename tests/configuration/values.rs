@@ -14,12 +14,12 @@ fn values_arrive_where_they_belong() {
     ) + "[realtime]\nrate_hz = 2_000\ncpu = 0x3\n[timeouts]\nmeasured_ms = 5\n[plant]\nstep_us = 100\n";
     let config = Config::parse(&text, "test.toml").unwrap();
     let machine = &config.machine;
-    assert_eq!(machine.gravity.as_slice(), [-9.81, 0.0, 0.0]);
+    assert_eq!(machine.gravity_m_s2.as_slice(), [-9.81, 0.0, 0.0]);
     assert_eq!(machine.platform.inertia.m11, 0.375);
-    assert_eq!(machine.rod.transverse_inertia.reference_length, 0.83);
-    assert_eq!(machine.cylinder.transverse_inertia.constant, 0.0038);
-    assert_eq!(machine.cylinder.transverse_inertia.quadratic, 0.0);
-    assert_eq!((machine.actuator.max_rate, machine.actuator.max_force), (2.0, 500.0));
+    assert_eq!(machine.rod.transverse_inertia.reference_length_m, 0.83);
+    assert_eq!(machine.cylinder.transverse_inertia.constant_kg_m2, 0.0038);
+    assert_eq!(machine.cylinder.transverse_inertia.quadratic_kg, 0.0);
+    assert_eq!((machine.actuator.max_rate_m_s, machine.actuator.max_force_n), (2.0, 500.0));
     assert_eq!(machine.home, [0.0, 0.0, 0.0, 1.1, 0.0, 0.0]);
     assert_eq!(machine.joints.triples.unpack(&machine.joints.base[2])[1], 0.704769465589);
     assert_eq!(machine.joints.triples.unpack(&machine.joints.platform[1])[5], 0.321393804843);

@@ -79,7 +79,7 @@ impl Levels {
             acceleration: level(limits.acceleration),
             with_feedback: level((1.0 + world.parameters.feedback_scale) * limits.acceleration),
             jerk: level(limits.jerk),
-            tolerance_mm: level(1e3 * world.parameters.engage_position),
+            tolerance_mm: level(1e3 * world.parameters.engage_position_m),
         }
     }
 }

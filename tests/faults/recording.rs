@@ -65,7 +65,7 @@ impl Recording {
                 continue;
             };
             let wanted = |sample: &Sample| sample.output.reference.map(|reference| reference.acceleration);
-            over(&mut peaks.force, largest(&sample.output.force) / max_force);
+            over(&mut peaks.force, largest(&sample.output.command_n) / max_force);
             over(&mut peaks.acceleration, acceleration_share(parameters, &now));
             if let Some(wanted) = wanted(sample) {
                 over(&mut peaks.reference_acceleration, acceleration_share(parameters, &wanted));
@@ -73,8 +73,8 @@ impl Recording {
             if let Some(before) = before {
                 let change = |(now, before): (&f64, &f64)| (now - before).abs();
                 let step =
-                    sample.output.force.iter().zip(&before.output.force).map(change).fold(0.0, f64::max);
-                over(&mut peaks.force_rate, step / period_s / parameters.force_rate);
+                    sample.output.command_n.iter().zip(&before.output.command_n).map(change).fold(0.0, f64::max);
+                over(&mut peaks.force_rate, step / period_s / parameters.force_rate_n_s);
                 let then = before.acceleration.unwrap_or_default();
                 over(&mut peaks.jerk, jerk_share(parameters, &then, &now));
                 if let Some((then, now)) = wanted(before).zip(wanted(sample)) {

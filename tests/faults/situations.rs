@@ -65,7 +65,7 @@ impl Situation {
         let (mut config, _) = machine(mode);
         config.deployment.setpoint.on_violation = policy;
         // The model is exact here, and the file states that.
-        config.machine.actuator.friction_uncertainty = 0.0;
+        config.machine.actuator.friction_uncertainty_n = 0.0;
         if self == Self::Engaging {
             config.deployment.limits.reference.autonomous_scale = SLOW_SCALE;
         }
@@ -80,7 +80,7 @@ impl Situation {
         match self {
             Self::Standby => {}
             Self::Engaging => {
-                home.x[5] += 0.75 * parameters.engage_position;
+                home.x[5] += 0.75 * parameters.engage_position_m;
                 world.source = Source::Still(home);
                 world.ask(Request::Engage);
                 world.run(30);

@@ -66,7 +66,7 @@ fn run(variant: Variant, situation: Situation, disturbance: Disturbance) -> Outc
         changes: changes(&path, situation),
         last: *path.last().unwrap(),
         path,
-        peaks: world.recording.peaks(&world.parameters, world.machine.actuator.max_force),
+        peaks: world.recording.peaks(&world.parameters, world.machine.actuator.max_force_n),
         rest_s: world.recording.time_to_rest(),
         world,
     }
@@ -140,7 +140,7 @@ fn complaints(
     }
     for sample in &outcome.world.recording.samples {
         let output = &sample.output;
-        if !output.state.has_control() && output.force != [0.0; 6] {
+        if !output.state.has_control() && output.command_n != [0.0; 6] {
             wrong.push(format!("a force in {:?}", output.state));
         }
         if output.state == State::Fault && !output.diagnostic.code.is_fault() {

@@ -117,9 +117,9 @@ impl World {
         let has_none = |measurement: &&mut Measurement| {
             !self.rates.are_sent(measurement.time_ns / self.parameters.period_ns)
         };
-        input.measurement.iter_mut().filter(has_none).for_each(|measurement| measurement.rate = None);
+        input.measurement.iter_mut().filter(has_none).for_each(|measurement| measurement.rate_m_s = None);
         let output = self.rig.controller.step(&input);
-        let force = output.state.has_control().then_some(output.force);
+        let force = output.state.has_control().then_some(output.command_n);
         let applied = self.applied(force);
         self.rig.pass(applied);
         self.record(now_ns, Some(output));
@@ -177,7 +177,7 @@ impl World {
     /// A load of so many times the platform's weight hangs from now on.
     pub fn load(&mut self, share: f64) {
         let mut heavy = self.machine.clone();
-        heavy.platform.mass *= 1.0 + share;
+        heavy.platform.mass_kg *= 1.0 + share;
         let models = [&heavy, &self.machine].map(InverseDynamics::new);
         self.grip = Grip::Load(Box::new(models));
     }

@@ -97,7 +97,7 @@ fn a_trajectory_is_judged_by_its_rows() {
         let (mut sum, mut squares, mut max, mut peak, mut count) = (0.0, 0.0, 0.0_f64, 0.0_f64, 0.0);
         let mut judged = 0;
         let actuator = machine(name).actuator;
-        let stroke = actuator.min_length..=actuator.max_length;
+        let stroke = actuator.min_length_m..=actuator.max_length_m;
         for k in 0..table.rows.len() {
             if !table.legs(k, "length").iter().all(|length| stroke.contains(length)) {
                 continue;

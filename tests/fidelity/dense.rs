@@ -42,7 +42,7 @@ fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
             let number = Fidelity::ALL.iter().position(|fidelity| *fidelity == choice).unwrap();
             // In each set against its own peak: whoever looks at one alone must find it so.
             for (what, seen) in [("inside", &inside), ("corners", &corners)] {
-                let share = seen.errors[number].max / seen.peak;
+                let share = seen.errors[number].max_n / seen.peak_n;
                 let name = &scene.name;
                 let is_within = seen.evaluated == 0 || share <= 1.1 * tolerance;
                 assert!(is_within, "{name}, {what}: {choice:?}, {share:.3e} for {tolerance:.3e}");
@@ -66,9 +66,9 @@ fn the_worst_that_is_reported_exists() {
         assert_eq!(comparison.all.outside, 0, "{}", scene.name);
         let [inside, corners] = dense(&scene);
         for ((error, inside), corners) in comparison.errors.iter().zip(&inside.errors).zip(&corners.errors) {
-            let (seen, name) = (inside.max.max(corners.max), &scene.name);
-            assert!(seen >= 0.95 * error.max, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max);
-            assert!(seen <= 1.05 * error.max, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max);
+            let (seen, name) = (inside.max_n.max(corners.max_n), &scene.name);
+            assert!(seen >= 0.95 * error.max_n, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max_n);
+            assert!(seen <= 1.05 * error.max_n, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max_n);
         }
     }
 }
@@ -95,17 +95,17 @@ fn every_machine_has_an_envelope_of_its_own() {
         assert!(full.bounds().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
         for k in 0..CORNER_COUNT {
             let sample = FidelitySample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
-            assert!(sample.is_ok_and(|s| s.peak < 0.8 * machine.actuator.max_force), "{name}, corner {k}");
-            let rates = leg_motion(&machine, &full.at(&full.corner(k)).motion()).rate;
+            assert!(sample.is_ok_and(|s| s.peak_n < 0.8 * machine.actuator.max_force_n), "{name}, corner {k}");
+            let rates = leg_motion(&machine, &full.at(&full.corner(k)).motion()).rate_m_s;
             // Only the telescope's legs are so slow that this decides.
-            let most = 0.8 * machine.actuator.max_rate;
+            let most = 0.8 * machine.actuator.max_rate_m_s;
             assert!(rates.iter().all(|rate| rate.abs() <= most), "{name}: {rates:?}");
         }
         // Too weak to hold itself, or without room: it stays at home, and still there is a choice.
-        machine.actuator.max_force = 1e-3;
+        machine.actuator.max_force_n = 1e-3;
         assert_eq!(envelope_of(&machine).bounds().velocity, [0.0; 6]);
         let length = leg_lengths(&machine, &full.at(&full.rest()).motion().pose);
-        machine.actuator.max_length = length.iter().copied().fold(0.0, f64::max);
+        machine.actuator.max_length_m = length.iter().copied().fold(0.0, f64::max);
         let none = envelope_of(&machine);
         assert_eq!(none.bounds().pose_max, [0.0; 6], "{name}");
         let comparison = FidelityComparison::of_envelope(&InverseDynamics::new(&machine), &none);

@@ -60,8 +60,8 @@ impl Seen {
         if let Some(setpoint) = &input.setpoint {
             self.add(setpoint.kind);
         }
-        if let Some(Measurement { rate, pose, drives, .. }) = &input.measurement {
-            let DriveStatus { enabled, brake_open, fault, force } = drives;
+        if let Some(Measurement { rate_m_s: rate, pose, drives, .. }) = &input.measurement {
+            let DriveStatus { enabled, brake_open, fault, force_n: force } = drives;
             let is_given = [enabled.is_some(), brake_open.is_some(), fault.is_some(), force.is_some()];
             self.add_if(rate.is_some(), "rates");
             self.add_if(rate.is_none(), "lengths alone");

@@ -30,7 +30,7 @@ impl OutputHash {
             diagnostic,
             answered_message: MessageId { epoch, sequence },
             request_diagnostic,
-            force,
+            command_n: force,
             wrench_error: Wrench { torque, force: wrench_force },
             active_limits: LimitSet(limits),
             missed_measurements,
@@ -49,7 +49,7 @@ impl OutputHash {
         self.word(*missed_measurements);
         self.word(*missed_setpoints);
         self.optional(platform.as_ref(), |hash, platform| {
-            let PlatformState { pose, twist, condition, time_to_singularity } = platform;
+            let PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity } = platform;
             hash.pose(pose);
             hash.twist(twist);
             hash.numbers([condition, time_to_singularity]);

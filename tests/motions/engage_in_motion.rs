@@ -36,10 +36,10 @@ type Motion<'a> = &'a dyn Fn(f64) -> TaskState;
 /// Whether a platform at rest may engage on this setpoint.
 fn can_engage(parameters: &Parameters, task: &TaskState) -> bool {
     let twist = task.motion().twist;
-    let stiffness = [parameters.law.position.stiffness, parameters.law.orientation.stiffness];
+    let stiffness = [parameters.law.position.kp_per_s2, parameters.law.orientation.kp_per_s2];
     let [v, omega] = [twist.linear.norm() / stiffness[0].sqrt(), twist.angular.norm() / stiffness[1].sqrt()];
-    v < WITHIN_TOLERANCE * parameters.engage_position
-        && omega < WITHIN_TOLERANCE * parameters.engage_orientation
+    v < WITHIN_TOLERANCE * parameters.engage_position_m
+        && omega < WITHIN_TOLERANCE * parameters.engage_orientation_rad
 }
 
 fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64, runs: &mut Runs) {
@@ -109,7 +109,7 @@ fn certificate_engaging_onto_a_moving_setpoint_stays_within_the_limits() {
         );
         let limits = &parameters.limits.position;
         let (v, a, j) = (limits.velocity, limits.acceleration, limits.jerk);
-        let lag = parameters.engage_position + LARGEST_LAG_RATIO * (0.5 * v * v / a + 0.5 * v * a / j);
+        let lag = parameters.engage_position_m + LARGEST_LAG_RATIO * (0.5 * v * v / a + 0.5 * v * a / j);
         report.bound(name, "distance from the setpoint", runs.distance_m, lag);
     }
     report.assert();

@@ -61,7 +61,7 @@ fn frozen_sensors_lead_to_no_acceleration_beyond_the_limits_and_to_a_fault() {
             without_fault +=
                 f64::from(u32::from(last.state.has_control() || !last.diagnostic.code.is_fault()));
         }
-        let ratio = parameters.following_velocity / parameters.limits.position.velocity;
+        let ratio = parameters.following_velocity_m_s / parameters.limits.position.velocity;
         report.add_with(name, &runs, |quantity| allowed(quantity, ratio));
         report.bound(name, "runs without a fault", without_fault, 0.0);
     }

@@ -30,13 +30,13 @@ pub struct Heave {
 
 impl Heave {
     pub fn new(machine: &Machine, parameters: &Parameters) -> Self {
-        let up = -machine.gravity.normalize();
+        let up = -machine.gravity_m_s2.normalize();
         let reaches = |offset: f64| {
             let mut pose = machine.home_pose();
             pose.position += up * offset;
             let margins = leg_lengths(machine, &pose).map(|length| machine.actuator.margin(length));
-            margins.iter().all(|margin| *margin > parameters.stroke_margin + RESERVE_M)
-                && KinematicState::new(machine, pose).sensitivity().condition < 0.5 * parameters.condition
+            margins.iter().all(|margin| *margin > parameters.stroke_margin_m + RESERVE_M)
+                && KinematicState::new(machine, pose).sensitivity().condition < 0.5 * parameters.max_condition
         };
         let end = |sign: f64| {
             let mut offset = 0.0;
@@ -71,14 +71,14 @@ impl Heave {
 
     /// A move of minimum jerk from rest to rest.
     pub fn moving(&self, [from, to]: [f64; 2], duration_s: f64, t: f64) -> TaskState {
-        let Profile { value: s, rate, accel } = rise(t, duration_s);
+        let Profile { value_share: s, rate_per_s: rate, accel_per_s2: accel } = rise(t, duration_s);
         let d = to - from;
         self.at([from + d * s, d * rate, d * accel])
     }
 
     /// A sine about an offset that grows from rest.
     pub fn sine(&self, middle: f64, amplitude: f64, omega: f64, t: f64) -> TaskState {
-        let Profile { value: s, rate, accel } = rise(t, FADE_S);
+        let Profile { value_share: s, rate_per_s: rate, accel_per_s2: accel } = rise(t, FADE_S);
         let (sin, cos) = (omega * t).sin_cos();
         let (x, v, a) = (sin, omega * cos, -omega * omega * sin);
         self.at([
@@ -92,14 +92,14 @@ impl Heave {
 /// Duration of a move of minimum jerk that uses a share of the limits.
 pub fn duration_s(parameters: &Parameters, machine: &Machine, distance: f64) -> f64 {
     let limits = &parameters.limits.position;
-    let velocity = limits.velocity.min(machine.actuator.max_rate);
+    let velocity = limits.velocity.min(machine.actuator.max_rate_m_s);
     shortest_duration(distance, [velocity, limits.acceleration, limits.jerk].map(|limit| SHARE * limit))
 }
 
 /// Amplitude of a sine that uses a share of the limits, and at most half of the range.
 pub fn amplitude(parameters: &Parameters, machine: &Machine, heave: &Heave, omega: f64) -> f64 {
     let limits = &parameters.limits.position;
-    let velocity = limits.velocity.min(machine.actuator.max_rate);
+    let velocity = limits.velocity.min(machine.actuator.max_rate_m_s);
     let within = (velocity / omega).min(limits.acceleration / omega.powi(2)).min(limits.jerk / omega.powi(3));
     (SHARE * within).min(0.5 * (heave.range[1] - heave.range[0]))
 }

@@ -54,7 +54,7 @@ fn certificate_a_source_replaced_in_motion_leads_to_no_motion_beyond_the_limits(
                     let gap_s = (observed.now_ns - last.time_ns) as f64 * 1e-9;
                     let carried = last.task.after(gap_s).x;
                     let begun_s = observed.time_s();
-                    let step = heave.at([STEP_RATIO * parameters.engage_position, 0.0, 0.0]).x
+                    let step = heave.at([STEP_RATIO * parameters.engage_position_m, 0.0, 0.0]).x
                         - heave.at([0.0; 3]).x;
                     let shift = carried + step - sine((turns + next) * turn_s).x;
                     while observed.time_s() < begun_s + AFTER_S {

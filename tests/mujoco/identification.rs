@@ -58,12 +58,12 @@ struct Trial {
 fn drawn_with_links(file: &Machine, random: &mut Random) -> Machine {
     let mut machine = drawn(file, random);
     let mut off = || 1.0 + 0.3 * random.signed();
-    machine.rod.mass = file.rod.mass;
+    machine.rod.mass_kg = file.rod.mass_kg;
     for link in [&mut machine.cylinder, &mut machine.rod] {
-        link.mass *= off();
-        link.center_of_mass *= off();
-        link.axial_inertia *= off();
-        link.transverse_inertia.constant *= off();
+        link.mass_kg *= off();
+        link.center_of_mass_m *= off();
+        link.axial_inertia_kg_m2 *= off();
+        link.transverse_inertia.constant_kg_m2 *= off();
     }
     machine
 }
@@ -72,27 +72,27 @@ fn drawn_with_links(file: &Machine, random: &mut Random) -> Machine {
 fn written(table: &Table, machine: &Machine) -> Table {
     let mut table = table.clone();
     let platform = &machine.platform;
-    set(&mut table, "platform", "mass_kg", platform.mass);
-    set(&mut table, "platform", "center_of_mass_m", Vec::from(<[f64; 3]>::from(platform.center_of_mass)));
+    set(&mut table, "platform", "mass_kg", platform.mass_kg);
+    set(&mut table, "platform", "center_of_mass_m", Vec::from(<[f64; 3]>::from(platform.center_of_mass_m)));
     let i = &platform.inertia;
     let elements = [("xx", i.m11), ("yy", i.m22), ("zz", i.m33), ("xy", i.m12), ("xz", i.m13), ("yz", i.m23)];
     let inertia: Table = elements.into_iter().map(|(key, value)| (key.to_owned(), value.into())).collect();
     set(&mut table, "platform", "inertia_kg_m2", inertia);
-    for (section, Link { mass, center_of_mass, axial_inertia, transverse_inertia }) in
+    for (section, Link { mass_kg: mass, center_of_mass_m: center_of_mass, axial_inertia_kg_m2: axial_inertia, transverse_inertia }) in
         [("cylinder", &machine.cylinder), ("rod", &machine.rod)]
     {
-        assert_eq!(transverse_inertia.quadratic, 0.0, "a number in the file");
+        assert_eq!(transverse_inertia.quadratic_kg, 0.0, "a number in the file");
         set(&mut table, section, "mass_kg", *mass);
         set(&mut table, section, "center_of_mass_m", *center_of_mass);
         set(&mut table, section, "axial_inertia_kg_m2", *axial_inertia);
-        set(&mut table, section, "transverse_inertia_kg_m2", transverse_inertia.constant);
+        set(&mut table, section, "transverse_inertia_kg_m2", transverse_inertia.constant_kg_m2);
     }
     let actuator = &machine.actuator;
-    set(&mut table, "actuator", "reflected_mass_kg", actuator.reflected_mass);
+    set(&mut table, "actuator", "reflected_mass_kg", actuator.reflected_mass_kg);
     for (key, values) in [
-        ("viscous_friction_n_s_m", actuator.viscous_friction),
-        ("coulomb_friction_n", actuator.coulomb_friction),
-        ("load_friction", actuator.load_friction),
+        ("viscous_friction_n_s_m", actuator.viscous_friction_n_s_m),
+        ("coulomb_friction_n", actuator.coulomb_friction_n),
+        ("load_friction", actuator.load_friction_share),
         ("force_scale", actuator.force_scale),
     ] {
         set(&mut table, "actuator", key, Vec::from(values));
@@ -114,7 +114,7 @@ impl Trial {
         let machine = Config::parse(&table.to_string(), "the machine file").unwrap().machine;
         let mut random = Random::new(seed);
         let truth = drawn_with_links(&machine, &mut random);
-        let with_weight = loaded(&truth, WEIGHT_RATIO * machine.platform.mass, Vector3::from(WEIGHT_AT));
+        let with_weight = loaded(&truth, WEIGHT_RATIO * machine.platform.mass_kg, Vector3::from(WEIGHT_AT));
         let [truth_file, with_weight_file] = [("truth.toml", &truth), ("with_weight.toml", &with_weight)]
             .map(|(name, machine)| {
                 let path = folder.join(name);
@@ -123,7 +123,7 @@ impl Trial {
             });
         let friction = folder.join("friction.csv");
         let mut rows = String::from("load_friction,stribeck_n,stribeck_speed_m_s\n");
-        for (load, coulomb) in truth.actuator.load_friction.iter().zip(truth.actuator.coulomb_friction) {
+        for (load, coulomb) in truth.actuator.load_friction_share.iter().zip(truth.actuator.coulomb_friction_n) {
             let [excess, speed] = [0.3, 0.008].map(|mean| mean * (1.0 + 0.25 * random.signed()));
             writeln!(rows, "{load},{},{speed}", excess * coulomb).unwrap();
         }
@@ -204,7 +204,7 @@ impl Trial {
 
     /// The known weight \[kg\].
     fn weight(&self) -> f64 {
-        WEIGHT_RATIO * self.file.platform.mass
+        WEIGHT_RATIO * self.file.platform.mass_kg
     }
 
     /// Machine file of the body, with the delay of its drives: none.

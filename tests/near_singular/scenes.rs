@@ -110,11 +110,11 @@ fn approach(
             if !(condition < 1e13) {
                 continue;
             }
-            let r = machine.joints.radius;
+            let r = machine.joints.radius_m;
             let twist = Twist { angular: vector(random), linear: vector(random) * r };
             // A load without regard to the pose, and one that moderate forces balance.
             let any = Acceleration { angular: vector(random) * 10.0, linear: vector(random) * 10.0 * r };
-            let force = Vector6::from_fn(|_, _| random.signed()) * (10.0 * machine.platform.mass);
+            let force = Vector6::from_fn(|_, _| random.signed()) * (10.0 * machine.platform.mass_kg);
             let smooth = dynamics.acceleration(&pose, &twist, &force.into());
             let rates = Vector6::from_fn(|_, _| random.signed());
             let moderate = leg_wrenches(machine, &pose).transpose() * twist.vector();
@@ -150,7 +150,7 @@ pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
     let random = &mut Random::new(2008);
     for name in MACHINES {
         let machine = machine(name);
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         let start = machine.home_pose();
         let up = start.rotation.column(2).into_owned();
         // Turns about the vertical, about axes across it, screws.

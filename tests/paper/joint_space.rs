@@ -29,7 +29,7 @@ fn legs_in_joint_coordinates_are_those_of_the_dense_matrices() {
                 vectors.add((found.bias - bias).amax() / scale);
                 vectors.add((found.accel - joint.accel).amax() / joint.accel.amax());
                 // J_Bv^-T D = n (Gamma - drive) - phi
-                wrench += at_c(&leg.arm, &found.contact_force);
+                wrench += at_c(&leg.arm, &found.contact_force_n);
             }
             let expected = platform_wrench(&case.machine, &p, &EXACT);
             balance.add((wrench - expected).amax() / row.exact.amax());

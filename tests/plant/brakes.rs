@@ -34,27 +34,27 @@ fn without_force_all_legs_stop_in_a_straight_line_at_the_same_time() {
     for name in ["fried2008", "motion_base", "tsai2000", "scattered"] {
         let mut simulator = in_motion(&machine(name));
         let begin = simulator.leg_motion();
-        let fastest = largest(&begin.rate);
+        let fastest = largest(&begin.rate_m_s);
         let duration = fastest / DECELERATION;
         assert!(fastest > 0.05, "{name}: {fastest}");
         let (dt, mut t) = (0.05 * duration, 0.0);
-        let mut before = begin.rate;
+        let mut before = begin.rate_m_s;
         while !matches!(simulator.brakes(), Brakes::Closed) {
             simulator.advance(dt, None);
             t += dt;
-            let rates = simulator.leg_motion().rate;
+            let rates = simulator.leg_motion().rate_m_s;
             let share = (1.0 - t / duration).max(0.0);
             for i in 0..LEGS {
-                assert!((rates[i] - share * begin.rate[i]).abs() < 1e-9 * fastest, "{name} leg {i} at {t}");
-                assert!(rates[i] * begin.rate[i] >= -1e-12, "{name}: leg {i} turned back");
+                assert!((rates[i] - share * begin.rate_m_s[i]).abs() < 1e-9 * fastest, "{name} leg {i} at {t}");
+                assert!(rates[i] * begin.rate_m_s[i] >= -1e-12, "{name}: leg {i} turned back");
                 assert!(rates[i].abs() <= before[i].abs() + 1e-12, "{name}: leg {i} sped up");
             }
             before = rates;
         }
         assert!(t <= 1.06 * duration, "{name}: {t} of {duration}");
         for i in 0..LEGS {
-            let way = simulator.leg_motion().length[i] - begin.length[i];
-            let expected = 0.5 * begin.rate[i] * duration;
+            let way = simulator.leg_motion().length_m[i] - begin.length_m[i];
+            let expected = 0.5 * begin.rate_m_s[i] * duration;
             assert!((way - expected).abs() < 1e-4 * fastest * duration, "{name} leg {i}: {way} {expected}");
         }
         let end = *simulator.state();
@@ -113,11 +113,11 @@ fn an_end_stop_closes_the_brakes_for_good() {
     for (name, sign) in [("fried2008", 1.0), ("motion_base", 1.0), ("motion_base", -1.0), ("tsai2000", 1.0)] {
         let machine = machine(name);
         let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
-        let push = [sign * 0.5 * machine.actuator.max_force; LEGS];
+        let push = [sign * 0.5 * machine.actuator.max_force_n; LEGS];
         simulator.advance(5.0, Some(&push));
         let Brakes::EndStop { leg } = simulator.brakes() else { panic!("{name}: {:?}", simulator.brakes()) };
-        let length = simulator.leg_motion().length[leg];
-        let (min, max) = (machine.actuator.min_length, machine.actuator.max_length);
+        let length = simulator.leg_motion().length_m[leg];
+        let (min, max) = (machine.actuator.min_length_m, machine.actuator.max_length_m);
         assert!(!(min..=max).contains(&length), "{name}: leg {leg} is {length}");
         // It stops within the step that took it there; nothing here gets faster than 30 m/s.
         let beyond = (min - length).max(length - max);

@@ -36,7 +36,7 @@ fn forward_dynamics_inverts_inverse_dynamics() {
 fn the_smallest_leg_mass_is_a_bound() {
     for name in MACHINES {
         let mut machine = machine(name);
-        machine.gravity.fill(0.0);
+        machine.gravity_m_s2.fill(0.0);
         let dynamics = ForwardDynamics::new(&machine);
         for Motion { pose, .. } in motions(name) {
             let smallest = dynamics.smallest_leg_mass(&pose).unwrap();
@@ -44,7 +44,7 @@ fn the_smallest_leg_mass_is_a_bound() {
                 let force: [f64; 6] = Vector6::ith(k, 1.0).into();
                 let acceleration = dynamics.acceleration(&pose, &Twist::default(), &force).unwrap();
                 let motion = Motion { pose, twist: Twist::default(), acceleration };
-                let accel = leg_motion(&machine, &motion).accel[k];
+                let accel = leg_motion(&machine, &motion).accel_m_s2[k];
                 assert!(accel > 0.0 && accel <= (1.0 + 1e-9) / smallest, "{name}: {accel} {smallest}");
             }
         }

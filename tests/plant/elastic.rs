@@ -3,7 +3,7 @@
 use super::energy::energy;
 use super::*;
 
-const SPRING: ElasticLeg = ElasticLeg { stiffness: 2e7, damping: 0.0, backlash: 0.0 };
+const SPRING: ElasticLeg = ElasticLeg { stiffness_n_per_m: 2e7, damping_n_s_m: 0.0, backlash_m: 0.0 };
 
 fn elastic(spring: ElasticLeg) -> Imperfections {
     Imperfections { leg: Some(spring), ..Imperfections::default() }
@@ -12,7 +12,7 @@ fn elastic(spring: ElasticLeg) -> Imperfections {
 /// A machine without friction.
 fn smooth(name: &str) -> Machine {
     let mut machine = machine(name);
-    (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
+    (machine.actuator.viscous_friction_n_s_m, machine.actuator.coulomb_friction_n) = ([0.0; 6], [0.0; 6]);
     machine
 }
 
@@ -20,12 +20,12 @@ fn smooth(name: &str) -> Machine {
 fn total(machine: &Machine, simulator: &Simulator, spring: &ElasticLeg) -> f64 {
     let drives = simulator.leg_motion();
     let lengths = leg_lengths(machine, &simulator.state().pose);
-    let half = 0.5 * spring.backlash;
+    let half = 0.5 * spring.backlash_m;
     let mut sum = energy(&without_drives(machine.clone()), simulator.state()).total();
-    for (length, (drive, rate)) in lengths.iter().zip(drives.length.iter().zip(drives.rate)) {
+    for (length, (drive, rate)) in lengths.iter().zip(drives.length_m.iter().zip(drives.rate_m_s)) {
         let pressed = drive - length;
         let beyond = pressed - pressed.clamp(-half, half);
-        sum += 0.5 * spring.stiffness * beyond * beyond + 0.5 * machine.actuator.reflected_mass * rate * rate;
+        sum += 0.5 * spring.stiffness_n_per_m * beyond * beyond + 0.5 * machine.actuator.reflected_mass_kg * rate * rate;
     }
     sum
 }
@@ -35,8 +35,8 @@ fn total(machine: &Machine, simulator: &Simulator, spring: &ElasticLeg) -> f64 {
 fn springs_keep_energy() {
     for backlash in [0.0, 2e-4] {
         let mut machine = smooth("motion_base");
-        machine.gravity.fill(0.0);
-        let spring = ElasticLeg { backlash, ..SPRING };
+        machine.gravity_m_s2.fill(0.0);
+        let spring = ElasticLeg { backlash_m: backlash, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         simulator.advance(0.02, Some(&[4000.0, -4000.0, 4000.0, 3000.0, -2000.0, 1000.0]));
         let start = total(&machine, &simulator, &spring);
@@ -44,7 +44,7 @@ fn springs_keep_energy() {
         for _ in 0..500 {
             simulator.advance(1e-3, Some(&[0.0; LEGS]));
             worst = worst.max((total(&machine, &simulator, &spring) / start - 1.0).abs());
-            let drives = Vector6::from(simulator.leg_motion().length);
+            let drives = Vector6::from(simulator.leg_motion().length_m);
             swing =
                 swing.max((drives - Vector6::from(leg_lengths(&machine, &simulator.state().pose))).amax());
         }
@@ -58,14 +58,14 @@ fn springs_keep_energy() {
 #[test]
 fn damping_takes_the_ringing_away() {
     let mut machine = smooth("motion_base");
-    machine.gravity.fill(0.0);
+    machine.gravity_m_s2.fill(0.0);
     let ringing = |damping| {
-        let spring = ElasticLeg { damping, ..SPRING };
+        let spring = ElasticLeg { damping_n_s_m: damping, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         simulator.advance(0.02, Some(&[4000.0, -4000.0, 4000.0, 3000.0, -2000.0, 1000.0]));
         simulator.advance(0.5, Some(&[0.0; LEGS]));
         let legs = leg_lengths(&machine, &simulator.state().pose);
-        (Vector6::from(simulator.leg_motion().length) - Vector6::from(legs)).amax()
+        (Vector6::from(simulator.leg_motion().length_m) - Vector6::from(legs)).amax()
     };
     let (with, without) = (ringing(2e4), ringing(0.0));
     assert!(without > 1e-5 && with < 1e-2 * without, "{with} {without}");
@@ -76,17 +76,17 @@ fn damping_takes_the_ringing_away() {
 fn a_loaded_leg_is_deflected_and_at_rest() {
     let machine = smooth("motion_base");
     for backlash in [0.0, 1e-4] {
-        let spring = ElasticLeg { backlash, ..SPRING };
+        let spring = ElasticLeg { backlash_m: backlash, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         let legs = leg_lengths(&machine, &simulator.state().pose);
         let hold = holding(&machine, &simulator.state().pose);
         for i in 0..LEGS {
-            let deflection = simulator.leg_motion().length[i] - legs[i];
-            let expected = hold[i] / spring.stiffness + 0.5 * backlash * hold[i].signum();
+            let deflection = simulator.leg_motion().length_m[i] - legs[i];
+            let expected = hold[i] / spring.stiffness_n_per_m + 0.5 * backlash * hold[i].signum();
             assert!((deflection - expected).abs() < 1e-12 && deflection > 1e-5, "{deflection} {expected}");
         }
         simulator.advance(0.2, Some(&hold));
-        let fastest = largest(&simulator.leg_motion().rate);
+        let fastest = largest(&simulator.leg_motion().rate_m_s);
         assert!(fastest < 1e-9, "{fastest}");
     }
 }
@@ -95,18 +95,18 @@ fn a_loaded_leg_is_deflected_and_at_rest() {
 #[test]
 fn play_separates_drive_and_platform() {
     let mut machine = smooth("motion_base");
-    machine.gravity.fill(0.0);
-    let spring = ElasticLeg { backlash: 1e-3, ..SPRING };
+    machine.gravity_m_s2.fill(0.0);
+    let spring = ElasticLeg { backlash_m: 1e-3, ..SPRING };
     let mut simulator = simulator(&machine, &elastic(spring));
     let start = *simulator.state();
-    let length = simulator.leg_motion().length;
+    let length = simulator.leg_motion().length_m;
     // 100 N move 400 kg by 0.4 mm in 56 ms, within half of the play.
     for _ in 0..56 {
         simulator.advance(1e-3, Some(&[100.0; LEGS]));
         assert_eq!(simulator.state().pose.position, start.pose.position);
     }
-    let way = simulator.leg_motion().length[0] - length[0];
-    let expected = 0.5 * 100.0 / machine.actuator.reflected_mass * 0.056 * 0.056;
+    let way = simulator.leg_motion().length_m[0] - length[0];
+    let expected = 0.5 * 100.0 / machine.actuator.reflected_mass_kg * 0.056 * 0.056;
     assert!((way / expected - 1.0).abs() < 1e-9, "{way} {expected}");
     simulator.advance(0.02, Some(&[100.0; LEGS]));
     assert!((simulator.state().pose.position - start.pose.position).norm() > 1e-6, "then it hits the flank");
@@ -117,8 +117,8 @@ fn play_separates_drive_and_platform() {
 #[test]
 fn a_stiff_leg_is_nearly_rigid() {
     let mut machine = machine("motion_base");
-    machine.actuator.coulomb_friction = [100.0; 6];
-    let friction = Friction { viscous: 700.0, coulomb: 50.0, ..Friction::default() };
+    machine.actuator.coulomb_friction_n = [100.0; 6];
+    let friction = Friction { viscous_n_s_m: 700.0, coulomb_n: 50.0, ..Friction::default() };
     let run = |leg| {
         let wanted = Imperfections { friction, leg, ..Imperfections::default() };
         let mut simulator = simulator(&machine, &wanted);
@@ -133,7 +133,7 @@ fn a_stiff_leg_is_nearly_rigid() {
     };
     let rigid = run(None);
     let [softer, stiffer] = [1e8, 4e8].map(|stiffness| {
-        let spring = ElasticLeg { stiffness, damping: 1e5, ..SPRING };
+        let spring = ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: 1e5, ..SPRING };
         run(Some(spring)).displacement_to(&rigid).linear.norm()
     });
     let way = home(&machine).pose.displacement_to(&rigid).linear.norm();
@@ -145,7 +145,7 @@ fn a_stiff_leg_is_nearly_rigid() {
 #[test]
 fn the_step_keeps_the_tolerance() {
     let machine = smooth("motion_base");
-    let spring = |stiffness, damping| elastic(ElasticLeg { stiffness, damping, backlash: 0.0 });
+    let spring = |stiffness, damping| elastic(ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: damping, backlash_m: 0.0 });
     let lag = |hertz| {
         let mut wanted = Imperfections::default();
         wanted.drive.bandwidth_hz = Some(hertz);
@@ -166,10 +166,10 @@ fn the_step_keeps_the_tolerance() {
             let cycle = |k| {
                 let sign = if k / 10 % 2 == 0 { 1.0 } else { -1.0 };
                 simulator.advance(1e-3, Some(&hold.map(|force| force + 1000.0 * sign)));
-                Vector6::from(simulator.leg_motion().length)
+                Vector6::from(simulator.leg_motion().length_m)
             };
             let lengths: Vec<_> = (0..100).map(cycle).collect();
-            (simulator.terms().step, lengths)
+            (simulator.terms().step_s, lengths)
         };
         let apart = |a: &[Vector6<f64>], b: &[Vector6<f64>]| {
             a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
@@ -189,10 +189,10 @@ fn the_step_keeps_the_tolerance() {
 fn what_cannot_be_seen_is_left_out() {
     let machine = machine("motion_base");
     let terms = |stiffness, backlash, hertz| {
-        let mut wanted = elastic(ElasticLeg { stiffness, backlash, damping: 0.0 });
+        let mut wanted = elastic(ElasticLeg { stiffness_n_per_m: stiffness, backlash_m: backlash, damping_n_s_m: 0.0 });
         wanted.drive.bandwidth_hz = Some(hertz);
         let terms = *simulator(&machine, &wanted).terms();
-        (terms.elastic.is_some(), terms.lag.is_some(), terms.step < DEFAULT_STEP_S)
+        (terms.elastic.is_some(), terms.lag_per_s.is_some(), terms.step_s < DEFAULT_STEP_S)
     };
     // 20 kN deflect 1e12 N/m by 0.02 um.
     assert_eq!(terms(1e12, 0.0, 1e5), (false, false, false));
@@ -201,7 +201,7 @@ fn what_cannot_be_seen_is_left_out() {
     assert_eq!(terms(1e12, 0.0, 1000.0), (false, true, true));
     // A drive without mass has no motion of its own.
     let massless = hexad_support::machine("fried2008");
-    assert_eq!(massless.actuator.reflected_mass, 0.0);
+    assert_eq!(massless.actuator.reflected_mass_kg, 0.0);
     let simulator = simulator(&massless, &elastic(SPRING));
     assert!(simulator.terms().elastic.is_none());
     assert_eq!(Legs::of(simulator.machine()).base, Legs::of(&massless).base);
@@ -214,7 +214,7 @@ fn a_brake_holds_drive_and_rod_alike() {
     let mut simulator = simulator(&machine, &elastic(SPRING));
     let deflection = |simulator: &Simulator| {
         let legs = leg_lengths(&machine, &simulator.state().pose);
-        Vector6::from(simulator.leg_motion().length) - Vector6::from(legs)
+        Vector6::from(simulator.leg_motion().length_m) - Vector6::from(legs)
     };
     for k in 0..300 {
         let force = shaking(&machine, simulator.state(), 1e-3 * f64::from(k), 0.1, 1.0);
@@ -224,5 +224,5 @@ fn a_brake_holds_drive_and_rod_alike() {
     simulator.advance(1.0, None);
     assert_eq!(simulator.brakes(), Brakes::Closed);
     assert!((deflection(&simulator) - before).amax() < 1e-12 && before.amax() > 1e-5);
-    assert_eq!(simulator.leg_motion().rate, [0.0; LEGS]);
+    assert_eq!(simulator.leg_motion().rate_m_s, [0.0; LEGS]);
 }

@@ -23,12 +23,12 @@ pub fn energy(machine: &Machine, state: &BodyState) -> Energy {
     let (r, c) = (state.pose.rotation, state.pose.position);
     let (omega, v) = (state.twist.angular, state.twist.linear);
     let body = &machine.platform;
-    let arm = r * body.center_of_mass;
+    let arm = r * body.center_of_mass_m;
     let inertia = r * body.inertia * r.transpose();
     let mut sum = Energy {
-        kinetic: 0.5 * body.mass * (v + omega.cross(&arm)).norm_squared()
+        kinetic: 0.5 * body.mass_kg * (v + omega.cross(&arm)).norm_squared()
             + 0.5 * omega.dot(&(inertia * omega)),
-        potential: -body.mass * machine.gravity.dot(&(c + arm)),
+        potential: -body.mass_kg * machine.gravity_m_s2.dot(&(c + arm)),
         spin: 0.0,
     };
     let Legs { base, platform, universal_axis } = Legs::of(machine);
@@ -53,10 +53,10 @@ pub fn worked(
     let mut work = 0.0;
     for _ in 0..pairs {
         for weight in [1.0, 4.0] {
-            work += weight * power(simulator.leg_motion().rate) * DEFAULT_STEP_S / 3.0;
+            work += weight * power(simulator.leg_motion().rate_m_s) * DEFAULT_STEP_S / 3.0;
             simulator.advance(DEFAULT_STEP_S, Some(force));
         }
-        work += power(simulator.leg_motion().rate) * DEFAULT_STEP_S / 3.0;
+        work += power(simulator.leg_motion().rate_m_s) * DEFAULT_STEP_S / 3.0;
     }
     (start, energy(machine, simulator.state()).kinetic - start, work)
 }
@@ -84,13 +84,13 @@ impl Leg {
         let angular = across + n * spin;
 
         let cylinder = &machine.cylinder;
-        let at = self.a + n * cylinder.center_of_mass;
-        add_link(machine, cylinder, length, &n, &at, &(n_rate * cylinder.center_of_mass), &angular, sum);
+        let at = self.a + n * cylinder.center_of_mass_m;
+        add_link(machine, cylinder, length, &n, &at, &(n_rate * cylinder.center_of_mass_m), &angular, sum);
         let rod = &machine.rod;
-        let at = self.b - n * rod.center_of_mass;
-        let velocity = self.b_velocity - n_rate * rod.center_of_mass;
+        let at = self.b - n * rod.center_of_mass_m;
+        let velocity = self.b_velocity - n_rate * rod.center_of_mass_m;
         add_link(machine, rod, length, &n, &at, &velocity, &angular, sum);
-        sum.kinetic += 0.5 * machine.actuator.reflected_mass * rate * rate;
+        sum.kinetic += 0.5 * machine.actuator.reflected_mass_kg * rate * rate;
     }
 }
 
@@ -106,12 +106,12 @@ fn add_link(
     sum: &mut Energy,
 ) {
     let inertia = &link.transverse_inertia;
-    let transverse = inertia.constant + inertia.quadratic * (length - inertia.reference_length).powi(2);
+    let transverse = inertia.constant_kg_m2 + inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2);
     let along = angular.dot(axis);
     let across = angular - axis * along;
-    let spin = 0.5 * link.axial_inertia * along * along;
+    let spin = 0.5 * link.axial_inertia_kg_m2 * along * along;
     sum.kinetic +=
-        0.5 * link.mass * velocity.norm_squared() + 0.5 * transverse * across.norm_squared() + spin;
+        0.5 * link.mass_kg * velocity.norm_squared() + 0.5 * transverse * across.norm_squared() + spin;
     sum.spin += spin;
-    sum.potential -= link.mass * machine.gravity.dot(at);
+    sum.potential -= link.mass_kg * machine.gravity_m_s2.dot(at);
 }

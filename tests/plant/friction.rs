@@ -27,10 +27,10 @@ fn dry_friction_takes_energy_and_nothing_chatters() {
         [("scattered", 75.0), ("fried2008", 3.0), ("tsai2000", 0.5), ("motion_base", 3000.0)]
     {
         let mut machine = machine(name);
-        machine.gravity.fill(0.0);
-        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [coulomb; 6]);
+        machine.gravity_m_s2.fill(0.0);
+        (machine.actuator.viscous_friction_n_s_m, machine.actuator.coulomb_friction_n) = ([0.0; 6], [coulomb; 6]);
         // The energy of a rod whose inertia varies is not conserved to begin with.
-        machine.rod.transverse_inertia.quadratic = 0.0;
+        machine.rod.transverse_inertia.quadratic_kg = 0.0;
         let energies = coasting(&machine, 2.0);
         let (first, last) = (energies[0], energies[energies.len() - 1]);
         assert!(energies.is_sorted_by(|a, b| *b <= a + 1e-15 * first), "{name} gained energy");
@@ -42,14 +42,14 @@ fn dry_friction_takes_energy_and_nothing_chatters() {
 #[test]
 fn dry_friction_holds() {
     let mut machine = machine("scattered");
-    machine.gravity.fill(0.0);
-    machine.actuator.viscous_friction = [0.0; 6];
+    machine.gravity_m_s2.fill(0.0);
+    machine.actuator.viscous_friction_n_s_m = [0.0; 6];
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
-    let smoothing = simulator.machine().actuator.coulomb_smoothing;
+    let smoothing = simulator.machine().actuator.coulomb_smoothing_m_s;
     let half = 0.5 * machine.actuator.largest_coulomb_friction();
     for _ in 0..1000 {
         simulator.advance(1e-3, Some(&[half, -half, half, half, -half, -half]));
-        let fastest = largest(&simulator.leg_motion().rate);
+        let fastest = largest(&simulator.leg_motion().rate_m_s);
         assert!(fastest < smoothing, "{fastest} of {smoothing}");
     }
     let BodyState { twist, .. } = *simulator.state();
@@ -60,7 +60,7 @@ fn dry_friction_holds() {
 #[test]
 fn viscous_friction_dissipates_what_it_should() {
     let mut machine = machine("motion_base");
-    machine.gravity.fill(0.0);
+    machine.gravity_m_s2.fill(0.0);
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
     simulator.advance(0.2, Some(&[300.0; 6]));
     let c = machine.actuator.largest_viscous_friction();
@@ -76,10 +76,10 @@ fn load_friction_takes_its_share_of_the_drives_power() {
     const FORCE_SCALE: [f64; 6] = [0.9, 1.1, 1.0, 0.8, 1.2, 1.05];
     const LOAD_FRICTION: [f64; 6] = [0.3, 0.1, 0.0, 0.2, 0.05, 0.25];
     let mut machine = machine("motion_base");
-    machine.gravity.fill(0.0);
+    machine.gravity_m_s2.fill(0.0);
     let actuator = &mut machine.actuator;
-    (actuator.viscous_friction, actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
-    (actuator.force_scale, actuator.load_friction) = (FORCE_SCALE, LOAD_FRICTION);
+    (actuator.viscous_friction_n_s_m, actuator.coulomb_friction_n) = ([0.0; 6], [0.0; 6]);
+    (actuator.force_scale, actuator.load_friction_share) = (FORCE_SCALE, LOAD_FRICTION);
     let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
     // Every leg is faster than the smoothing speed from here on.
     simulator.advance(0.05, Some(&COMMAND));

@@ -25,7 +25,7 @@ fn without_imperfections_hardware_is_the_model_bit_for_bit() {
             let force = shaking(&machine, simulator.state(), 0.7e-3 * f64::from(k), 0.1, 1.0);
             simulator.advance(700_000.0 * 1e-9, (k % 100 < 90).then_some(&force));
             let legs = simulator.leg_motion();
-            assert_eq!(read, (legs.length, legs.rate), "{name}, cycle {k}");
+            assert_eq!(read, (legs.length_m, legs.rate_m_s), "{name}, cycle {k}");
         }
         assert_eq!(hardware.simulator().state(), simulator.state(), "{name}");
     }
@@ -44,7 +44,7 @@ fn a_configuration_without_the_keys_has_none_of_it() {
 /// Everything that draws random numbers.
 fn noisy(seed: u64) -> Imperfections {
     let mut wanted = Imperfections { seed, ..Imperfections::default() };
-    (wanted.sensor.length_noise, wanted.sensor.rate_noise, wanted.build.joints) = (1e-6, 1e-4, 1e-5);
+    (wanted.sensor.length_noise_m, wanted.sensor.rate_noise_m_s, wanted.build.joint_deviation_m) = (1e-6, 1e-4, 1e-5);
     wanted
 }
 
@@ -60,7 +60,7 @@ fn the_same_seed_gives_the_same_run() {
 fn sensors_have_the_noise_and_the_steps_that_were_asked_for() {
     let machine = machine("motion_base");
     let mut wanted = Imperfections::default();
-    (wanted.sensor.length_noise, wanted.sensor.rate_noise) = (3e-6, 2e-4);
+    (wanted.sensor.length_noise_m, wanted.sensor.rate_noise_m_s) = (3e-6, 2e-4);
     let mut noisy = hardware(&machine, &wanted);
     let truth = noisy.simulator().leg_motion();
     let [mut length, mut rate] = [Errors::default(); 2];
@@ -68,11 +68,11 @@ fn sensors_have_the_noise_and_the_steps_that_were_asked_for() {
     for _ in 0..5000 {
         let (lengths, rates) = noisy.measure();
         for i in 0..LEGS {
-            length.add(lengths[i] - truth.length[i]);
-            rate.add(rates[i] - truth.rate[i]);
-            sum += lengths[i] - truth.length[i];
+            length.add(lengths[i] - truth.length_m[i]);
+            rate.add(rates[i] - truth.rate_m_s[i]);
+            sum += lengths[i] - truth.length_m[i];
         }
-        products += (lengths[0] - truth.length[0]) * (lengths[1] - truth.length[1]);
+        products += (lengths[0] - truth.length_m[0]) * (lengths[1] - truth.length_m[1]);
     }
     // 30,000 samples: standard errors of 0.4 % of the deviation, 0.6 % of the mean, 1.4 % of the correlation.
     assert!((length.rms() / 3e-6 - 1.0).abs() < 0.02 && (rate.rms() / 2e-4 - 1.0).abs() < 0.02, "{length:?}");
@@ -82,7 +82,7 @@ fn sensors_have_the_noise_and_the_steps_that_were_asked_for() {
     assert!((products / 5e3).abs() < 0.06 * 9e-12, "legs are independent: {products}");
 
     wanted = Imperfections::default();
-    (wanted.sensor.length_step, wanted.sensor.rate_step) = (1e-5, 1e-3);
+    (wanted.sensor.length_step_m, wanted.sensor.rate_step_m_s) = (1e-5, 1e-3);
     let mut coarse = hardware(&machine, &wanted);
     let (mut moved, mut largest) = (0, 0.0_f64);
     for k in 0..200 {
@@ -92,13 +92,13 @@ fn sensors_have_the_noise_and_the_steps_that_were_asked_for() {
         let (lengths, rates) = coarse.measure();
         for i in 0..LEGS {
             for (read, true_value, step) in
-                [(lengths[i], truth.length[i], 1e-5), (rates[i], truth.rate[i], 1e-3)]
+                [(lengths[i], truth.length_m[i], 1e-5), (rates[i], truth.rate_m_s[i], 1e-3)]
             {
                 assert!((read / step - (read / step).round()).abs() < 1e-9, "{read} is a multiple of {step}");
                 assert!((read - true_value).abs() < 0.5001 * step, "{read} of {true_value}");
                 largest = largest.max((read - true_value).abs() / step);
             }
-            moved += usize::from(lengths[i] != truth.length[i]);
+            moved += usize::from(lengths[i] != truth.length_m[i]);
         }
     }
     assert!(moved > 1000 && largest > 0.45, "{moved} {largest}");
@@ -138,7 +138,7 @@ fn a_dead_time_shifts_the_motion() {
 fn a_force_is_rounded_to_its_step() {
     let machine = machine("motion_base");
     let mut wanted = Imperfections::default();
-    wanted.drive.force_step = 50.0;
+    wanted.drive.force_step_n = 50.0;
     let mut coarse = hardware(&machine, &wanted);
     let mut ideal = hardware(&machine, &Imperfections::default());
     let force = shaking(&machine, ideal.simulator().state(), 0.0, 0.1, 1.0);
@@ -157,7 +157,7 @@ fn joints_are_displaced_once_and_by_as_much_as_asked() {
     let (mut errors, mut sum) = (Errors::default(), 0.0);
     for seed in 0..200 {
         let mut wanted = Imperfections { seed, ..Imperfections::default() };
-        wanted.build = BuildErrors { joints: 1e-4, ..BuildErrors::default() };
+        wanted.build = BuildErrors { joint_deviation_m: 1e-4, ..BuildErrors::default() };
         let hardware = hardware(&machine, &wanted);
         let after = Legs::of(hardware.simulator().machine());
         assert_eq!(after.universal_axis, before.universal_axis);

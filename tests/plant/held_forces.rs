@@ -14,7 +14,7 @@ fn no_motion_changes_an_acceleration_faster_than_the_bounds_of_the_jerk() {
     for name in MACHINES {
         let machine = machine(name);
         let plant = ForwardDynamics::new(&machine);
-        let pose = machine.home_pose().displaced(&displacement(0.01 * machine.joints.radius));
+        let pose = machine.home_pose().displaced(&displacement(0.01 * machine.joints.radius_m));
         let rest = Motion { pose, twist: Twist::default(), acceleration: Acceleration::default() };
         let forces = inverse_dynamics::<Exact>(&machine, &rest).unwrap();
         let bounds = HeldForces::new(&machine).jerk_bounds(&pose, &limits).unwrap();
@@ -24,7 +24,7 @@ fn no_motion_changes_an_acceleration_faster_than_the_bounds_of_the_jerk() {
             let rates = leg_wrenches(&machine, &pose).tr_mul(&velocity.vector());
             let slower = (limits.orientation.velocity / velocity.angular.norm())
                 .min(limits.position.velocity / velocity.linear.norm())
-                .min(machine.actuator.max_rate / rates.amax());
+                .min(machine.actuator.max_rate_m_s / rates.amax());
             let later = pose.displaced(&Twist::from_vector(&(velocity.vector() * (slower * dt))));
             let change = plant.acceleration(&later, &rest.twist, &forces).unwrap();
             most = [most[0].max(change.angular.norm() / dt), most[1].max(change.linear.norm() / dt)];

@@ -6,22 +6,22 @@ use super::*;
 /// A machine in space whose drives only push.
 fn floating(name: &str) -> Machine {
     let mut machine = without_drives(machine(name));
-    machine.gravity.fill(0.0);
-    machine.rod.transverse_inertia.quadratic = 0.0;
+    machine.gravity_m_s2.fill(0.0);
+    machine.rod.transverse_inertia.quadratic_kg = 0.0;
     machine
 }
 
 /// A payload is a point with the force `m (a - g)`: the wrench it adds about C is known without any inertia tensor.
 #[test]
 fn a_payload_needs_the_forces_of_a_point_mass() {
-    let build = BuildErrors { payload: 2.5, payload_at: Vector3::new(0.2, -0.1, 0.3), joints: 0.0 };
+    let build = BuildErrors { payload_kg: 2.5, payload_at_m: Vector3::new(0.2, -0.1, 0.3), joint_deviation_m: 0.0 };
     assert_each_within(1e-12, "with payload, wrench", &MACHINES, |machine, motion| {
         let Motion { pose, twist: Twist { angular, .. }, acceleration } = motion;
         let loaded = build.built(machine, &mut Random::new(0));
-        let arm = pose.rotation * build.payload_at;
+        let arm = pose.rotation * build.payload_at_m;
         let accelerates =
             acceleration.linear + acceleration.angular.cross(&arm) + angular.cross(&angular.cross(&arm));
-        let force = (accelerates - machine.gravity) * build.payload;
+        let force = (accelerates - machine.gravity_m_s2) * build.payload_kg;
         let n = leg_wrenches(machine, pose);
         let total = |machine| n * Vector6::from(inverse_dynamics::<Exact>(machine, motion).unwrap());
         let expected = Wrench { torque: arm.cross(&force), force }.vector();
@@ -73,7 +73,7 @@ fn an_external_wrench_swings() {
 
 #[test]
 fn stiction_is_there_at_rest_and_gone_at_speed() {
-    let friction = Friction { viscous: 10.0, coulomb: 4.0, stiction: 3.0, stribeck_speed: 0.01 };
+    let friction = Friction { viscous_n_s_m: 10.0, coulomb_n: 4.0, stiction_n: 3.0, stribeck_speed_m_s: 0.01 };
     for sign in [-1.0, 1.0] {
         for (rate, expected) in [
             (0.0, 0.0),
@@ -92,20 +92,20 @@ fn stiction_is_there_at_rest_and_gone_at_speed() {
 #[test]
 fn a_leg_sticks_until_it_breaks_loose() {
     let machine = floating("motion_base");
-    let friction = Friction { coulomb: 200.0, stiction: 300.0, ..Friction::default() };
+    let friction = Friction { coulomb_n: 200.0, stiction_n: 300.0, ..Friction::default() };
     let wanted = Imperfections { friction, ..Imperfections::default() };
     let mut simulator = simulator(&machine, &wanted);
-    let smoothing = simulator.machine().actuator.coulomb_smoothing;
+    let smoothing = simulator.machine().actuator.coulomb_smoothing_m_s;
     for _ in 0..500 {
         simulator.advance(1e-3, Some(&[450.0; LEGS]));
-        let fastest = largest(&simulator.leg_motion().rate);
+        let fastest = largest(&simulator.leg_motion().rate_m_s);
         assert!(fastest < smoothing, "it creeps at most: {fastest} of {smoothing}");
     }
     simulator.advance(0.02, Some(&[800.0; LEGS]));
-    let loose = largest(&simulator.leg_motion().rate);
+    let loose = largest(&simulator.leg_motion().rate_m_s);
     assert!(loose > 2.0 * Friction::STRIBECK_SPEED_M_S, "{loose}");
     simulator.advance(0.05, Some(&[450.0; LEGS]));
-    let after = largest(&simulator.leg_motion().rate);
+    let after = largest(&simulator.leg_motion().rate_m_s);
     assert!(after > 1.2 * loose, "it goes on: {loose} {after}");
 }
 
@@ -113,7 +113,7 @@ fn a_leg_sticks_until_it_breaks_loose() {
 #[test]
 fn friction_dissipates_what_it_should() {
     let machine = floating("motion_base");
-    let friction = Friction { viscous: 300.0, coulomb: 100.0, stiction: 150.0, stribeck_speed: 0.02 };
+    let friction = Friction { viscous_n_s_m: 300.0, coulomb_n: 100.0, stiction_n: 150.0, stribeck_speed_m_s: 0.02 };
     let mut simulator = simulator(&machine, &Imperfections { friction, ..Imperfections::default() });
     simulator.advance(0.1, Some(&[2000.0; LEGS]));
     let power =
@@ -129,7 +129,7 @@ fn a_lag_delays_the_force() {
     let mut wanted = Imperfections::default();
     wanted.drive.bandwidth_hz = Some(50.0);
     let mut simulator = simulator(&machine, &wanted);
-    assert!(simulator.terms().lag.is_some());
+    assert!(simulator.terms().lag_per_s.is_some());
     let w = TAU * 50.0;
     let push = [300.0; LEGS];
     let start = home(&machine);

@@ -29,7 +29,7 @@ fn halving_the_step_divides_the_error_by_sixteen() {
     for name in ["fried2008", "motion_base", "scattered", "tsai2000"] {
         let mut machine = machine(name);
         // The kink of dry friction has no fourth derivative.
-        machine.actuator.coulomb_friction = [0.0; 6];
+        machine.actuator.coulomb_friction_n = [0.0; 6];
         let ends = [1, 2, 4, 8, 64].map(|steps| *motion(&machine, 0.016, steps, 0.8).last().unwrap());
         let errors: Vec<_> = ends[..4].iter().map(|end| distance(end, &ends[4])).collect();
         let ratios: Vec<_> = errors.iter().zip(&errors[1..]).map(|(a, b)| a / b).collect();
@@ -44,7 +44,7 @@ fn an_attitude_whose_axis_turns_has_order_four() {
     let acceleration = |state: &PlantState, _: f64| {
         let angular = Vector3::z().cross(&state.platform.twist.angular);
         let platform = Acceleration { angular, linear: Vector3::zeros() };
-        Some(Accelerations { platform, drives: Vector6::zeros() })
+        Some(Accelerations { platform, drives_m_s2: Vector6::zeros() })
     };
     let mut start = home(&machine("fried2008"));
     start.twist.angular = Vector3::x() * 10.0;
@@ -73,6 +73,6 @@ fn the_default_step_is_exact_beside_a_micrometre() {
         position.assert_within(1e-12, &format!("{name} position after 5 s of default steps"));
         orientation.assert_within(1e-12, &format!("{name} orientation after 5 s of default steps"));
         let travel = found.iter().map(|state| (state.pose.position - home(&machine).pose.position).norm());
-        assert!(travel.fold(0.0, f64::max) > 0.05 * machine.joints.radius, "{name} moved");
+        assert!(travel.fold(0.0, f64::max) > 0.05 * machine.joints.radius_m, "{name} moved");
     }
 }

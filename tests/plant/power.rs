@@ -46,12 +46,12 @@ fn account(machine: &Machine, step: f64, size: f64, hertz: f64) -> Account {
 /// Legs that spin: fat, and 0.3 rad from the first axes of their universal joints.
 fn fat_legs(mut machine: Machine) -> Machine {
     for link in [&mut machine.cylinder, &mut machine.rod] {
-        link.axial_inertia = 1.5 * link.transverse_inertia.constant;
+        link.axial_inertia_kg_m2 = 1.5 * link.transverse_inertia.constant_kg_m2;
     }
     let pose = home(&machine).pose;
     let directions = leg_directions(&machine, &pose);
     let axes = directions.map(|n| {
-        let across = n.cross(&machine.gravity).normalize();
+        let across = n.cross(&machine.gravity_m_s2).normalize();
         n * 0.3f64.cos() + across * 0.3f64.sin()
     });
     machine.joints = Legs { universal_axis: axes, ..Legs::of(&machine) }.joints(&machine.home);
@@ -63,8 +63,8 @@ fn fat_legs(mut machine: Machine) -> Machine {
 fn work_becomes_energy() {
     let ideal = |name| without_drives(machine(name));
     let mut driven = machine("motion_base");
-    (driven.actuator.viscous_friction, driven.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
-    assert!(driven.actuator.reflected_mass > 0.0);
+    (driven.actuator.viscous_friction_n_s_m, driven.actuator.coulomb_friction_n) = ([0.0; 6], [0.0; 6]);
+    assert!(driven.actuator.reflected_mass_kg > 0.0);
     for (name, machine, size, hertz) in [
         ("motion_base", ideal("motion_base"), 0.1, 1.0),
         ("tsai2000", ideal("tsai2000"), 0.1, 1.0),
@@ -75,7 +75,7 @@ fn work_becomes_energy() {
         ("motion_base with fat legs", fat_legs(ideal("motion_base")), 0.1, 1.0),
         ("scattered with fat legs", fat_legs(ideal("scattered")), 0.1, 1.0),
     ] {
-        assert_eq!(machine.rod.transverse_inertia.quadratic, 0.0, "{name}: a rod that is rigid");
+        assert_eq!(machine.rod.transverse_inertia.quadratic_kg, 0.0, "{name}: a rod that is rigid");
         let account = account(&machine, DEFAULT_STEP_S, size, hertz);
         let share = account.gap / account.turnover;
         assert!(share < 1e-13 && account.gap < 1e-11 * account.kinetic_peak, "{name}: {account:?}");

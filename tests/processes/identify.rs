@@ -159,13 +159,13 @@ fn a_new_machine_is_identified_as_the_guide_says() {
 
     let [found, truth] =
         [machine.path("NEW.toml"), platform.clone()].map(|path| Config::load(&path).unwrap().machine);
-    let mass = |machine: &hexad::model::machine::Machine| machine.platform.mass + 6.0 * machine.rod.mass;
+    let mass = |machine: &hexad::model::machine::Machine| machine.platform.mass_kg + 6.0 * machine.rod.mass_kg;
     assert!((mass(&found) / mass(&truth) - 1.0).abs() < 2e-3, "{}", mass(&found));
     for leg in 0..6 {
         let [a, b] = [&found, &truth].map(|machine| &machine.actuator);
         assert!((a.force_scale[leg] / b.force_scale[leg] - 1.0).abs() < 2e-3, "{:?}", a.force_scale);
-        assert!((a.viscous_friction[leg] - b.viscous_friction[leg]).abs() < 0.5, "{:?}", a.viscous_friction);
-        assert!((a.coulomb_friction[leg] - b.coulomb_friction[leg]).abs() < 0.1, "{:?}", a.coulomb_friction);
+        assert!((a.viscous_friction_n_s_m[leg] - b.viscous_friction_n_s_m[leg]).abs() < 0.5, "{:?}", a.viscous_friction_n_s_m);
+        assert!((a.coulomb_friction_n[leg] - b.coulomb_friction_n[leg]).abs() < 0.1, "{:?}", a.coulomb_friction_n);
     }
 
     // A file that exists is kept, with one clear error.
@@ -236,7 +236,7 @@ fn a_first_motion_leads_to_an_identified_file() {
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         let [by_data_sheet, identified] = ["machine.toml", "NEW.toml"]
             .map(|file| Config::load(&machine.path(file)).unwrap().machine.actuator);
-        let [before, after] = [&by_data_sheet, &identified].map(|actuator| actuator.friction_uncertainty);
+        let [before, after] = [&by_data_sheet, &identified].map(|actuator| actuator.friction_uncertainty_n);
         let new = fs::read_to_string(machine.path("NEW.toml")).unwrap();
         assert!(new.matches("{ constant_kg_m2 = ").count() == 2, "{new}");
         assert!(after < share * before, "{name}: friction uncertainty {before} N, then {after} N");
@@ -248,6 +248,6 @@ fn a_first_motion_leads_to_an_identified_file() {
         let ended = Hexad::spawn(&machine, "identify", typed(&machine, line)).ends();
         let json: Value = serde_json::from_str(&ended.stdout).expect(&ended.stderr);
         let file = json["legs"][0][1]["file"].as_f64().unwrap();
-        assert_eq!(file, by_data_sheet.coulomb_friction[0], "{name}");
+        assert_eq!(file, by_data_sheet.coulomb_friction_n[0], "{name}");
     }
 }

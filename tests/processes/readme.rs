@@ -44,7 +44,7 @@ fn lengths() -> [f64; LEGS] {
         let next_ns = Grid::new(PERIOD_NS, 0).next_after(monotonic_ns());
         machine.simulator.advance((next_ns - tick_ns) as f64 * 1e-9, machine.force.as_ref());
         machine.tick_ns = next_ns;
-        machine.simulator.leg_motion().length
+        machine.simulator.leg_motion().length_m
     })
 }
 

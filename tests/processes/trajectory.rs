@@ -60,7 +60,7 @@ fn table() -> String {
     let row = |k: u32| {
         let t = SECONDS * f64::from(k) / 10.0;
         let s = rise(t, SECONDS);
-        let [x, rate, accel] = [HOME + WAY * s.value, WAY * s.rate, WAY * s.accel];
+        let [x, rate, accel] = [HOME + WAY * s.value_share, WAY * s.rate_per_s, WAY * s.accel_per_s2];
         format!("{t:?},0,0,0,{x:?},0,0,0,0,0,{rate:?},0,0,0,0,0,{accel:?},0,0\n")
     };
     trajectory_columns().join(",") + "\n" + &(0..=10).map(row).collect::<String>()

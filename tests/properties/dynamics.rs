@@ -17,7 +17,7 @@ proptest! {
         other in vector6(),
         share in -3.0..3.0f64,
     ) {
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         let other = other.component_mul(&Vector6::new(20.0, 20.0, 20.0, 20.0 * r, 20.0 * r, 20.0 * r));
         let one = motion.acceleration.vector();
         let with = |a: Vector6<f64>| {
@@ -33,11 +33,11 @@ proptest! {
     #[test]
     fn power_is_the_same_in_legs_and_in_the_platform((machine, _, motion) in machine_in_motion()) {
         let load = InverseDynamics::new(&machine).load_of::<Exact>(&motion);
-        let rates = Vector6::from(leg_motion(&machine, &motion).rate);
+        let rates = Vector6::from(leg_motion(&machine, &motion).rate_m_s);
         let gamma = forces(&machine, &motion);
-        let power = (gamma - load.axial_forces).dot(&rates);
+        let power = (gamma - load.axial_forces_n).dot(&rates);
         let expected = load.wrench.dot(&motion.twist.vector());
-        let scale = (gamma - load.axial_forces).component_mul(&rates).abs().sum();
+        let scale = (gamma - load.axial_forces_n).component_mul(&rates).abs().sum();
         prop_assert!((power - expected).abs() < 1e-12 * scale, "{power} {expected}");
         prop_assert_eq!(load.leg_wrenches, leg_wrenches(&machine, &motion.pose));
     }
@@ -47,13 +47,13 @@ proptest! {
     fn forces_at_rest_balance_gravity((machine, _, motion) in machine_in_motion()) {
         let rest = Motion { twist: Twist::default(), acceleration: Acceleration::default(), ..motion };
         let wrench = leg_wrenches(&machine, &rest.pose) * forces(&machine, &rest);
-        let (h, r) = (1e-4 * machine.joints.radius, machine.joints.radius);
+        let (h, r) = (1e-4 * machine.joints.radius_m, machine.joints.radius_m);
         for k in 0..6 {
             let step = Vector6::ith(k, if k < 3 { h / r } else { h });
             let at = |sign: f64| potential(&machine, &rest.pose.displaced(&Twist::from_vector(&(step * sign))));
             let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / 12.0;
             let work = wrench.dot(&step);
-            let scale = 9.81 * machine.platform.mass * h;
+            let scale = 9.81 * machine.platform.mass_kg * h;
             prop_assert!((slope - work).abs() < 1e-8 * scale, "{k}: {slope} {work}");
         }
     }
@@ -61,7 +61,7 @@ proptest! {
     /// A motion run backwards through the same poses needs the same forces, friction aside.
     #[test]
     fn time_can_be_reversed((mut machine, _, motion) in machine_in_motion()) {
-        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = ([0.0; 6], [0.0; 6]);
+        (machine.actuator.viscous_friction_n_s_m, machine.actuator.coulomb_friction_n) = ([0.0; 6], [0.0; 6]);
         let Twist { angular, linear } = motion.twist;
         let back = Motion { twist: Twist { angular: -angular, linear: -linear }, ..motion };
         prop_assert!(relative(forces(&machine, &back).as_slice(), forces(&machine, &motion).as_slice()) < 1e-12);
@@ -70,7 +70,7 @@ proptest! {
     #[test]
     fn without_axial_inertia_the_models_agree((mut machine, _, motion) in machine_in_motion()) {
         let spinning = forces(&machine, &motion);
-        (machine.cylinder.axial_inertia, machine.rod.axial_inertia) = (0.0, 0.0);
+        (machine.cylinder.axial_inertia_kg_m2, machine.rod.axial_inertia_kg_m2) = (0.0, 0.0);
         let exact = forces(&machine, &motion);
         prop_assert_eq!(&exact, &Vector6::from(inverse_dynamics::<RigidLegs>(&machine, &motion).unwrap()));
         prop_assert!(relative(spinning.as_slice(), exact.as_slice()) > 1e-9, "the spin costs something");
@@ -85,14 +85,14 @@ proptest! {
         load in vector6(),
     ) {
         machine.actuator.force_scale = scale.map(|scale| 1.2 + 0.7 * scale).into();
-        machine.actuator.load_friction = load.map(|load| 0.4 * (1.0 + load)).into();
+        machine.actuator.load_friction_share = load.map(|load| 0.4 * (1.0 + load)).into();
         let transmission = Transmission::of_motion(&machine, &motion);
         let forces = transmission.leg_forces(&commands.into());
         let (legs, actuator) = (leg_motion(&machine, &motion), &machine.actuator);
         for i in 0..6 {
             let own = actuator.force_scale[i] * commands[i];
-            let sign = (legs.rate[i] / actuator.coulomb_smoothing).clamp(-1.0, 1.0);
-            let expected = own - actuator.load_friction[i] * own.abs() * sign;
+            let sign = (legs.rate_m_s[i] / actuator.coulomb_smoothing_m_s).clamp(-1.0, 1.0);
+            let expected = own - actuator.load_friction_share[i] * own.abs() * sign;
             prop_assert!((forces[i] - expected).abs() <= 1e-12 * own.abs());
         }
         let back = Vector6::from(transmission.commands(&forces));
@@ -100,22 +100,22 @@ proptest! {
         // Whatever the rates, the available force takes no more than the largest command.
         for force in [actuator.available_force(), -actuator.available_force()] {
             let most = transmission.commands(&[force; 6]).into_iter().map(f64::abs).fold(0.0, f64::max);
-            prop_assert!(most <= actuator.max_force * (1.0 + 1e-12));
+            prop_assert!(most <= actuator.max_force_n * (1.0 + 1e-12));
         }
     }
 }
 
 /// Potential of all thirteen bodies.
 fn potential(machine: &Machine, pose: &Pose) -> f64 {
-    let height = |mass: f64, at: &Vector3<f64>| -mass * machine.gravity.dot(at);
+    let height = |mass: f64, at: &Vector3<f64>| -mass * machine.gravity_m_s2.dot(at);
     let Legs { base, platform, .. } = Legs::of(machine);
     let body = &machine.platform;
-    let mut sum = height(body.mass, &(pose.position + pose.rotation * body.center_of_mass));
+    let mut sum = height(body.mass_kg, &(pose.position + pose.rotation * body.center_of_mass_m));
     for (a, b) in base.iter().zip(&platform) {
         let b = pose.position + pose.rotation * b;
         let n = (b - a).normalize();
-        sum += height(machine.cylinder.mass, &(a + n * machine.cylinder.center_of_mass));
-        sum += height(machine.rod.mass, &(b - n * machine.rod.center_of_mass));
+        sum += height(machine.cylinder.mass_kg, &(a + n * machine.cylinder.center_of_mass_m));
+        sum += height(machine.rod.mass_kg, &(b - n * machine.rod.center_of_mass_m));
     }
     sum
 }

@@ -17,7 +17,7 @@ fn moved_base(machine: &Machine, motion: &Motion, q: &Matrix3<f64>, d: &Vector3<
         ..legs
     };
     let machine =
-        Machine { gravity: q * machine.gravity, joints: legs.joints(&machine.home), ..machine.clone() };
+        Machine { gravity_m_s2: q * machine.gravity_m_s2, joints: legs.joints(&machine.home), ..machine.clone() };
     let Motion { pose, twist, acceleration } = motion;
     let motion = Motion {
         pose: Pose { rotation: q * pose.rotation, position: q * pose.position + d },
@@ -39,7 +39,7 @@ fn moved_platform(
     let of_new = |v: Vector3<f64>| q.tr_mul(&(v - d));
     let legs = Legs::of(machine);
     result.joints = Legs { platform: legs.platform.map(of_new), ..legs }.joints(&result.home);
-    result.platform.center_of_mass = of_new(machine.platform.center_of_mass);
+    result.platform.center_of_mass_m = of_new(machine.platform.center_of_mass_m);
     result.platform.inertia = q.transpose() * machine.platform.inertia * q;
     let tool = Pose { rotation: *q, position: *d };
     (result, Frames { tool, ..Frames::default() }.tool_motion(motion))
@@ -48,28 +48,28 @@ fn moved_platform(
 /// Lengths times `s`, masses times `m`, times times `t`: forces are `m s / t^2` as large.
 fn rescaled(machine: &Machine, motion: &Motion, s: f64, m: f64, t: f64) -> (Machine, Motion) {
     let mut result = machine.clone();
-    result.gravity *= s / (t * t);
+    result.gravity_m_s2 *= s / (t * t);
     let legs = Legs::of(machine);
     let scaled = |legs: [Vector3<f64>; LEGS]| legs.map(|v| v * s);
     result.joints =
         Legs { base: scaled(legs.base), platform: scaled(legs.platform), ..legs }.joints(&result.home);
-    result.platform.mass *= m;
-    result.platform.center_of_mass *= s;
+    result.platform.mass_kg *= m;
+    result.platform.center_of_mass_m *= s;
     result.platform.inertia *= m * s * s;
     for link in [&mut result.cylinder, &mut result.rod] {
-        let Link { mass, center_of_mass, axial_inertia, transverse_inertia } = link;
+        let Link { mass_kg: mass, center_of_mass_m: center_of_mass, axial_inertia_kg_m2: axial_inertia, transverse_inertia } = link;
         *mass *= m;
         *center_of_mass *= s;
         *axial_inertia *= m * s * s;
-        transverse_inertia.constant *= m * s * s;
-        transverse_inertia.quadratic *= m;
-        transverse_inertia.reference_length *= s;
+        transverse_inertia.constant_kg_m2 *= m * s * s;
+        transverse_inertia.quadratic_kg *= m;
+        transverse_inertia.reference_length_m *= s;
     }
     let actuator = &mut result.actuator;
-    actuator.reflected_mass *= m;
-    actuator.viscous_friction = actuator.viscous_friction.map(|friction| friction * m / t);
-    actuator.coulomb_friction = actuator.coulomb_friction.map(|friction| friction * m * s / (t * t));
-    actuator.coulomb_smoothing *= s / t;
+    actuator.reflected_mass_kg *= m;
+    actuator.viscous_friction_n_s_m = actuator.viscous_friction_n_s_m.map(|friction| friction * m / t);
+    actuator.coulomb_friction_n = actuator.coulomb_friction_n.map(|friction| friction * m * s / (t * t));
+    actuator.coulomb_smoothing_m_s *= s / t;
     let Motion { pose, twist, acceleration } = motion;
     let motion = Motion {
         pose: Pose { rotation: pose.rotation, position: pose.position * s },
@@ -108,11 +108,11 @@ fn all_results(machine: &Machine, motion: &Motion, start: &Pose) -> Vec<u64> {
         inverse_dynamics::<MasslessLegs>(machine, motion),
     ];
     let mut state = KinematicState::new(machine, *start);
-    let report = refine(machine, &mut state, &legs.length);
+    let report = refine(machine, &mut state, &legs.length_m);
     let found = state.pose();
     let found = found.rotation.iter().chain(found.position.iter()).chain([&report.step_ratio]);
     let forces = fidelities.iter().flatten().flatten();
-    let legs = [&legs.length, &legs.rate, &legs.accel].into_iter().flatten();
+    let legs = [&legs.length_m, &legs.rate_m_s, &legs.accel_m_s2].into_iter().flatten();
     let condition = condition(machine, &motion.pose);
     forces.chain(legs).chain(found).chain([&condition]).map(|number| number.to_bits()).collect()
 }
@@ -122,14 +122,14 @@ proptest! {
 
     #[test]
     fn base_axes_do_not_matter((machine, _, motion) in machine_in_motion(), q in rotation(), d in vector3()) {
-        let (other, other_motion) = moved_base(&machine, &motion, &q, &(d * machine.joints.radius));
+        let (other, other_motion) = moved_base(&machine, &motion, &q, &(d * machine.joints.radius_m));
         prop_assert!(relative(&forces(&other, &other_motion), &forces(&machine, &motion)) < 1e-11);
     }
 
     #[test]
     fn platform_axes_do_not_matter((machine, _, motion) in machine_in_motion(), q in rotation(), d in vector3()) {
-        let (other, other_motion) = moved_platform(&machine, &motion, &q, &(d * machine.joints.radius));
-        prop_assert!((other.joints.radius / machine.joints.radius - 1.0).abs() < 1e-13);
+        let (other, other_motion) = moved_platform(&machine, &motion, &q, &(d * machine.joints.radius_m));
+        prop_assert!((other.joints.radius_m / machine.joints.radius_m - 1.0).abs() < 1e-13);
         prop_assert!(relative(&forces(&other, &other_motion), &forces(&machine, &motion)) < 1e-11);
     }
 
@@ -143,7 +143,7 @@ proptest! {
         let (other, other_motion) = rescaled(&machine, &motion, s, m, t);
         let expected = forces(&machine, &motion).map(|force| force * m * s / (t * t));
         prop_assert!(relative(&forces(&other, &other_motion), &expected) < 1e-12);
-        prop_assert!((other.joints.radius / (s * machine.joints.radius) - 1.0).abs() < 1e-14);
+        prop_assert!((other.joints.radius_m / (s * machine.joints.radius_m) - 1.0).abs() < 1e-14);
         let k = condition(&machine, &motion.pose);
         prop_assert!((condition(&other, &other_motion.pose) / k - 1.0).abs() < 1e-14 * k);
     }
@@ -161,20 +161,20 @@ proptest! {
             universal_axis: order.map(|leg| legs.universal_axis[leg]),
         };
         other.joints = legs.joints(&other.home);
-        for friction in [&mut other.actuator.viscous_friction, &mut other.actuator.coulomb_friction] {
+        for friction in [&mut other.actuator.viscous_friction_n_s_m, &mut other.actuator.coulomb_friction_n] {
             *friction = order.map(|leg| friction[leg]);
         }
         let expected = order.map(|leg| forces(&machine, &motion)[leg]);
         prop_assert!(relative(&forces(&other, &motion), &expected) < 1e-12);
-        let expected = order.map(|leg| leg_motion(&machine, &motion).accel[leg]);
-        prop_assert_eq!(leg_motion(&other, &motion).accel, expected, "a lane is a lane");
+        let expected = order.map(|leg| leg_motion(&machine, &motion).accel_m_s2[leg]);
+        prop_assert_eq!(leg_motion(&other, &motion).accel_m_s2, expected, "a lane is a lane");
     }
 
     /// To the bit: a recording is replayed on another processor. SSE4.2 rounds products on their own.
     #[test]
     fn instruction_sets_do_not_matter((machine, _, motion) in machine_in_motion(), off in vector3()) {
         let reference = Machine { level: Level::baseline(), ..machine.clone() };
-        let start = Pose { position: motion.pose.position + off * (1e-3 * machine.joints.radius), ..motion.pose };
+        let start = Pose { position: motion.pose.position + off * (1e-3 * machine.joints.radius_m), ..motion.pose };
         for level in levels() {
             let other = Machine { level, ..machine.clone() };
             if matches!(format!("{level:?}"), name if name.starts_with("Sse4_2")) {

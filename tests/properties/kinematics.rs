@@ -30,11 +30,11 @@ proptest! {
     fn rates_and_accels_are_the_derivatives_of_lengths((machine, state, motion) in machine_in_motion()) {
         let legs = leg_motion(&machine, &motion);
         let at = |t: f64| leg_motion(&machine, &state.after(t).motion());
-        let rates = derivative(|t| at(t).length);
-        let accels = derivative(|t| at(t).rate);
-        let scale = machine.joints.radius;
-        prop_assert!((rates - Vector6::from(legs.rate)).amax() < 1e-9 * scale.max(largest(&legs.length)));
-        prop_assert!((accels - Vector6::from(legs.accel)).amax() < 1e-8 * scale.max(largest(&legs.length)));
+        let rates = derivative(|t| at(t).length_m);
+        let accels = derivative(|t| at(t).rate_m_s);
+        let scale = machine.joints.radius_m;
+        prop_assert!((rates - Vector6::from(legs.rate_m_s)).amax() < 1e-9 * scale.max(largest(&legs.length_m)));
+        prop_assert!((accels - Vector6::from(legs.accel_m_s2)).amax() < 1e-8 * scale.max(largest(&legs.length_m)));
     }
 
     /// `L' = N^T [omega; v]`, and N belongs to the lengths: an imposed displacement changes them by `N^T d`.
@@ -45,7 +45,7 @@ proptest! {
     ) {
         let n = leg_wrenches(&machine, &motion.pose);
         let rates = n.transpose() * motion.twist.vector();
-        prop_assert!((rates - Vector6::from(leg_motion(&machine, &motion).rate)).amax() < 1e-13 * rates.amax());
+        prop_assert!((rates - Vector6::from(leg_motion(&machine, &motion).rate_m_s)).amax() < 1e-13 * rates.amax());
         let way = Twist::from_vector(&towards);
         let displaced = |t: f64| {
             let step = Twist { angular: way.angular * t, linear: way.linear * t };
@@ -53,7 +53,7 @@ proptest! {
         };
         let scale = largest(&leg_lengths(&machine, &motion.pose)).max(1.0);
         // A unit displacement is large beside a small machine: its fifth derivative is too.
-        let bound = 1e-9 * scale * (1.0 / machine.joints.radius).powi(4).max(1.0);
+        let bound = 1e-9 * scale * (1.0 / machine.joints.radius_m).powi(4).max(1.0);
         prop_assert!((derivative(displaced) - n.transpose() * towards).amax() < bound);
     }
 
@@ -64,7 +64,7 @@ proptest! {
         towards in vector6(),
         exponent in -14.0..-10.0,
     ) {
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         prop_assume!(towards.norm() > 0.1);
         let way = towards.normalize() * 10.0_f64.powf(exponent);
         let step = Twist { angular: way.fixed_rows::<3>(0).into(), linear: way.fixed_rows::<3>(3) * r };
@@ -80,10 +80,10 @@ proptest! {
 
     #[test]
     fn twists_follow_from_rates((machine, _, motion) in machine_in_motion()) {
-        let rates = leg_motion(&machine, &motion).rate;
+        let rates = leg_motion(&machine, &motion).rate_m_s;
         let twist = twist_from_rates(&machine, &motion.pose, &rates).unwrap().vector();
         let wanted = motion.twist.vector();
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         let scaled = |v: Vector6<f64>| v.component_mul(&Vector6::new(r, r, r, 1.0, 1.0, 1.0));
         let bound = 1e-14 * condition(&machine, &motion.pose) * scaled(wanted).amax();
         prop_assert!(scaled(twist - wanted).amax() < bound);
@@ -97,7 +97,7 @@ proptest! {
         prop_assert_eq!(tracker.find(&machine, &lengths).0, TrackingResult::Found);
         let bound = 1e-14 * condition(&machine, &motion.pose) * largest(&lengths).max(1.0);
         prop_assert!((tracker.pose().position - motion.pose.position).norm() < bound);
-        prop_assert!(angle_between(&tracker.pose().rotation, &motion.pose.rotation) < bound / machine.joints.radius);
+        prop_assert!(angle_between(&tracker.pose().rotation, &motion.pose.rotation) < bound / machine.joints.radius_m);
 
         // What moves a platform in a millisecond takes four steps, two or three of them with new factors.
         let Motion { twist, .. } = motion;

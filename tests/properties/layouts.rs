@@ -40,11 +40,11 @@ proptest! {
         prop_assert!(condition < 10.0, "{condition}");
 
         let load = InverseDynamics::new(&machine).load_of::<Exact>(&motion);
-        let expected = leg_wrenches(&machine, &motion.pose).lu().solve(&load.wrench).unwrap() + load.axial_forces;
+        let expected = leg_wrenches(&machine, &motion.pose).lu().solve(&load.wrench).unwrap() + load.axial_forces_n;
         let force = inverse_dynamics::<Exact>(&machine, &motion).unwrap();
         prop_assert!(relative(&force, expected.as_slice()) < 1e-11, "{force:?} {expected}");
 
-        let rates = leg_motion(&machine, &motion).rate;
+        let rates = leg_motion(&machine, &motion).rate_m_s;
         let twist = twist_from_rates(&machine, &motion.pose, &rates).unwrap().vector();
         prop_assert!((twist - motion.twist.vector()).amax() < 1e-11);
 

@@ -22,21 +22,21 @@ fn with_parameters(mut machine: Machine, p: &InertialParameters) -> Machine {
     let center = Vector3::new(at(1), at(2), at(3)) / at(0);
     let about_c = Matrix3::new(at(4), at(7), at(8), at(7), at(5), at(9), at(8), at(9), at(6));
     let shift = Matrix3::identity() * center.norm_squared() - center * center.transpose();
-    machine.platform.mass = at(0);
-    machine.platform.center_of_mass = center;
+    machine.platform.mass_kg = at(0);
+    machine.platform.center_of_mass_m = center;
     machine.platform.inertia = about_c - shift * at(0);
     // The mass of the cylinder is not felt: any will do.
-    machine.cylinder.mass = 3.0;
-    machine.rod.mass = at(14);
+    machine.cylinder.mass_kg = 3.0;
+    machine.rod.mass_kg = at(14);
     for (link, moment) in [(&mut machine.cylinder, 10), (&mut machine.rod, 15)] {
-        link.center_of_mass = at(moment) / link.mass;
-        link.transverse_inertia.constant = at(moment + 1) - at(moment) * link.center_of_mass;
-        link.axial_inertia = at(moment + 2);
-        link.transverse_inertia.quadratic = at(moment + 3);
+        link.center_of_mass_m = at(moment) / link.mass_kg;
+        link.transverse_inertia.constant_kg_m2 = at(moment + 1) - at(moment) * link.center_of_mass_m;
+        link.axial_inertia_kg_m2 = at(moment + 2);
+        link.transverse_inertia.quadratic_kg = at(moment + 3);
     }
-    machine.actuator.reflected_mass = at(REFLECTED);
-    machine.actuator.viscous_friction = core::array::from_fn(|leg| at(VISCOUS + leg));
-    machine.actuator.coulomb_friction = core::array::from_fn(|leg| at(COULOMB + leg));
+    machine.actuator.reflected_mass_kg = at(REFLECTED);
+    machine.actuator.viscous_friction_n_s_m = core::array::from_fn(|leg| at(VISCOUS + leg));
+    machine.actuator.coulomb_friction_n = core::array::from_fn(|leg| at(COULOMB + leg));
     machine
 }
 
@@ -52,16 +52,16 @@ proptest! {
         turned in vector3(),
     ) {
         let y = regressor(&machine, &motion).unwrap();
-        let mut other = Machine { joints: machine.joints.clone(), gravity: machine.gravity, ..other };
-        other.actuator.coulomb_smoothing = machine.actuator.coulomb_smoothing;
+        let mut other = Machine { joints: machine.joints.clone(), gravity_m_s2: machine.gravity_m_s2, ..other };
+        other.actuator.coulomb_smoothing_m_s = machine.actuator.coulomb_smoothing_m_s;
         let turn = nalgebra::Rotation3::from_scaled_axis(turned).into_inner();
         other.platform.inertia = turn * other.platform.inertia * turn.transpose();
         for (other, (one, q)) in [&mut other.cylinder, &mut other.rod]
             .into_iter()
             .zip([&machine.cylinder, &machine.rod].into_iter().zip(quadratic))
         {
-            other.transverse_inertia.reference_length = one.transverse_inertia.reference_length;
-            other.transverse_inertia.quadratic = q;
+            other.transverse_inertia.reference_length_m = one.transverse_inertia.reference_length_m;
+            other.transverse_inertia.quadratic_kg = q;
         }
         for machine in [&machine, &other] {
             let p = inertial_parameters(machine);
@@ -96,10 +96,10 @@ proptest! {
         machine in any_machine(),
         at in proptest::collection::vec([vector6(), vector6(), vector6()], 60),
     ) {
-        for (apart, rank) in [(0.3 * machine.joints.radius, 29), (0.0, 28)] {
+        for (apart, rank) in [(0.3 * machine.joints.radius_m, 29), (0.0, 28)] {
             let mut machine = machine.clone();
-            let reference = machine.rod.transverse_inertia.reference_length;
-            machine.cylinder.transverse_inertia.reference_length = reference + apart;
+            let reference = machine.rod.transverse_inertia.reference_length_m;
+            machine.cylinder.transverse_inertia.reference_length_m = reference + apart;
             let mut stacked = DMatrix::zeros(6 * at.len(), PARAMETER_COUNT);
             for (i, at) in at.iter().enumerate() {
                 let mut state = state_near_home(&machine, at);

@@ -4,7 +4,7 @@ use super::*;
 
 /// A kinematic_state that forward kinematics moved to the motion's pose.
 fn arrived(machine: &Machine, motion: &Motion, from: &Vector6<f64>) -> KinematicState {
-    let r = machine.joints.radius;
+    let r = machine.joints.radius_m;
     let away = from * 1e-3;
     let step = Twist { angular: away.fixed_rows::<3>(0).into(), linear: away.fixed_rows::<3>(3) * r };
     let mut kinematic_state = KinematicState::new(machine, motion.pose.displaced(&step));
@@ -17,7 +17,7 @@ fn arrived(machine: &Machine, motion: &Motion, from: &Vector6<f64>) -> Kinematic
 fn displaced_center(machine: &Machine, pose: &Pose, step: &Vector6<f64>) -> Pose {
     let center = Legs::of(machine).platform.iter().sum::<Vector3<f64>>() / 6.0;
     let rotation = exp(&step.fixed_rows::<3>(0).into()) * pose.rotation;
-    let shift = step.fixed_rows::<3>(3) * machine.joints.radius;
+    let shift = step.fixed_rows::<3>(3) * machine.joints.radius_m;
     Pose { rotation, position: pose.position + pose.rotation * center + shift - rotation * center }
 }
 
@@ -26,7 +26,7 @@ proptest! {
 
     #[test]
     fn twists_share_the_factorization((machine, _, motion) in machine_in_motion(), from in vector6()) {
-        let rates = leg_motion(&machine, &motion).rate;
+        let rates = leg_motion(&machine, &motion).rate_m_s;
         let bound = 1e-12 * condition(&machine, &motion.pose);
         for kinematic_state in [KinematicState::new(&machine, motion.pose), arrived(&machine, &motion, &from)] {
             let twist = kinematic_state.twist(&machine, &rates).unwrap().vector();
@@ -44,7 +44,7 @@ proptest! {
         prop_assert!((known.condition / frobenius - 1.0).abs() < 1e-11 * frobenius);
         let of_two_norm = condition(&machine, &motion.pose);
         prop_assert!((1.0..6.0).contains(&(known.condition / of_two_norm)));
-        let determinant = leg_wrenches(&machine, &motion.pose).determinant() / machine.joints.radius.powi(3);
+        let determinant = leg_wrenches(&machine, &motion.pose).determinant() / machine.joints.radius_m.powi(3);
         prop_assert!((known.determinant - determinant).abs() < 1e-12 * determinant.abs().max(1.0));
     }
 
@@ -56,7 +56,7 @@ proptest! {
         share in prop_oneof![Just(0.9), 0.0..0.9f64],
     ) {
         let mut kinematic_state = KinematicState::new(&machine, motion.pose);
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         let size = kinematic_state.sensitivity().trusted_step * share;
         let unit = towards / towards.norm().max(1e-3);
         let there = displaced_center(&machine, &motion.pose, &(unit * size));

@@ -69,7 +69,7 @@ fn setup(name: &str, seed: u64) -> (Constants, Vector6<f64>, f64) {
     if random.uniform() < 0.3 {
         let at_home =
             hexad::model::kinematic_state::KinematicState::new(&config.machine, config.machine.home_pose());
-        parameters.condition = at_home.sensitivity().condition * (1.1 + random.uniform());
+        parameters.max_condition = at_home.sensitivity().condition * (1.1 + random.uniform());
     }
     let constants = Constants::new(&config.machine, parameters);
     (constants, size, parameters.period_ns as f64 * 1e-9)

@@ -67,9 +67,9 @@ pub fn examine(
         let period_s = step_s * INSTANTS as f64;
         largest.add("derivative", (moved - mean).norm() / (jerk * period_s * period_s));
         let legs = leg_motion(machine, &now);
-        for (length, rate) in legs.length.iter().zip(legs.rate) {
-            largest.add("stroke", constants.parameters.stroke_margin - machine.actuator.margin(*length));
-            largest.add("leg rate", rate.abs() / machine.actuator.max_rate);
+        for (length, rate) in legs.length_m.iter().zip(legs.rate_m_s) {
+            largest.add("stroke", constants.parameters.stroke_margin_m - machine.actuator.margin(*length));
+            largest.add("leg rate", rate.abs() / machine.actuator.max_rate_m_s);
         }
         if let Some(Envelope { lowest, highest }) = &constants.parameters.envelope {
             let x = task_coordinates(&now.pose, &machine.home);
@@ -80,7 +80,7 @@ pub fn examine(
         }
         let kinematic_state = KinematicState::new(machine, now.pose);
         let sensitivity = kinematic_state.sensitivity();
-        largest.add("condition", sensitivity.condition / constants.parameters.condition);
+        largest.add("condition", sensitivity.condition / constants.parameters.max_condition);
         let home = constants.home.sensitivity().determinant;
         largest.add("determinant", if sensitivity.determinant * home > 0.0 { 0.0 } else { 1.0 });
         last = now;

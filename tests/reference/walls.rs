@@ -40,7 +40,7 @@ fn at(home: &[f64; 6], sines: &Sines, t: f64) -> TaskState {
 /// A machine whose drives hold the platform at every wall. Weak poses are a bound of their own, see `weak_poses`.
 fn with_strong_drives(machine: &str) -> Config {
     let mut config = Config::load(&data(machine, "toml")).unwrap();
-    config.machine.actuator.max_force *= 100.0;
+    config.machine.actuator.max_force_n *= 100.0;
     config
 }
 

@@ -29,7 +29,7 @@ fn constants(name: &str, holding: Option<f64>) -> Constants {
     let mut config = Config::load(format!("config/{name}.toml").as_ref()).unwrap();
     if let Some(holding) = holding {
         let at_home = held(&InverseDynamics::new(&config.machine), &config.machine.home_pose());
-        config.machine.actuator.max_force = at_home / holding;
+        config.machine.actuator.max_force_n = at_home / holding;
     }
     let mut parameters = parameters(&config);
     parameters.limits.autonomous_scale = 1.0;
@@ -39,14 +39,14 @@ fn constants(name: &str, holding: Option<f64>) -> Constants {
 /// The largest force at rest, as a share of the drives' largest force.
 fn held(dynamics: &InverseDynamics, pose: &Pose) -> f64 {
     share(dynamics, &Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() })
-        * dynamics.machine().actuator.max_force
+        * dynamics.machine().actuator.max_force_n
 }
 
 fn share(dynamics: &InverseDynamics, motion: &Motion) -> f64 {
     let forces = dynamics
         .forces::<Exact>(motion)
         .map_or(f64::INFINITY, |forces| forces.into_iter().map(f64::abs).fold(0.0, f64::max));
-    forces / dynamics.machine().actuator.max_force
+    forces / dynamics.machine().actuator.max_force_n
 }
 
 fn begun(constants: &Constants, pose: &Pose) -> ReferenceGenerator {
@@ -182,7 +182,7 @@ fn beyond(constants: &Constants, to: &Pose) -> Result<f64, TargetRefusal> {
 fn way(constants: &Constants, way: u64) -> impl Fn(f64) -> Pose {
     let home = *constants.home.pose();
     let mut random = Random::new(way);
-    let direction = Vector3::from_fn(|_, _| random.signed()).normalize() * constants.arm;
+    let direction = Vector3::from_fn(|_, _| random.signed()).normalize() * constants.arm_m;
     let turn = Vector3::from_fn(|_, _| random.signed()) * f64::from(way as u32 % 3) * 0.2;
     move |distance| home.displaced(&Twist { angular: turn * distance, linear: direction * distance })
 }
@@ -205,7 +205,7 @@ fn slow_motions_reach_nearly_all_poses_that_the_drives_can_hold() {
                     go(&mut reference, &constants, &at(possible * f64::from(part) / 20.0), 0.1, 10_000);
                 }
                 let left = reference.motion().pose.displacement_to(&at(possible)).linear.norm();
-                1.0 - left / (possible * constants.arm)
+                1.0 - left / (possible * constants.arm_m)
             })
             .collect();
         let least = ways.iter().copied().fold(1.0, f64::min);
@@ -236,7 +236,7 @@ fn a_start_where_the_drives_are_weak_is_left_towards_poses_that_need_less_force(
     let constants = constants("motion_base", None);
     let home = *constants.home.pose();
     let below = |z: f64| Pose { position: home.position + Vector3::z() * z, ..home };
-    let holding = |pose: &Pose| held(&constants.dynamics, pose) / constants.machine().actuator.max_force;
+    let holding = |pose: &Pose| held(&constants.dynamics, pose) / constants.machine().actuator.max_force_n;
     let start = below(-1.04);
     assert!((0.92..0.97).contains(&holding(&start)) && holding(&start) > MAX_HOLDING_SHARE);
     let mut reference = begun(&constants, &start);

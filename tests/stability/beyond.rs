@@ -15,7 +15,7 @@ fn carried(rig: &mut Rig, task: &TaskState) -> Output {
     let legs = leg_motion(rig.simulator().machine(), &task.motion());
     let mut input = rig.input(task);
     let measurement = input.measurement.as_mut().unwrap();
-    (measurement.length, measurement.rate) = (legs.length, Some(legs.rate));
+    (measurement.length_m, measurement.rate_m_s) = (legs.length_m, Some(legs.rate_m_s));
     rig.now_ns += rig.parameters.period_ns;
     rig.controller.step(&input)
 }
@@ -78,7 +78,7 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
     for torque in [4e4, 1e5, 4e5] {
         for condition in [100.0, ANY] {
             let mut config = motion_base(condition);
-            config.machine.actuator.max_force = 20e3;
+            config.machine.actuator.max_force_n = 20e3;
             config.deployment.control.following_position_m = f64::MAX;
             config.deployment.control.following_orientation_rad = f64::MAX;
             config.deployment.control.following_velocity_m_s = f64::MAX;
@@ -95,7 +95,7 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             let (mut limited, mut last) = (0, Output::default());
             for _ in 0..3000 {
                 last = rig.cycle(&rig.input(&home));
-                assert!(largest(&last.force) <= 20e3);
+                assert!(largest(&last.command_n) <= 20e3);
                 assert!(!last.state.has_control() || before(&config.machine, &rig.simulator().state().pose));
                 limited += u32::from(last.active_limits.contains(Limit::Force));
             }
@@ -122,10 +122,10 @@ fn the_time_to_a_singular_pose_is_told() {
             let distance = AT_HOME - speed * t;
             let Some(platform) = output.platform.filter(|_| k > 0) else { continue };
             told += 1;
-            let ratio = platform.time_to_singularity * speed / distance;
+            let ratio = platform.time_to_singularity_s * speed / distance;
             // The determinant is as good as linear at last, and taken from one measurement to the next.
             let near = (ratio - 1.0).abs() < 4.0 * distance + 1e-3 * speed / distance;
-            let is_right = if speed > 0.0 { near } else { platform.time_to_singularity == f64::INFINITY };
+            let is_right = if speed > 0.0 { near } else { platform.time_to_singularity_s == f64::INFINITY };
             assert!(is_right, "{speed} {distance}: {ratio}");
             assert!(
                 (platform.condition * distance / CONDITION - 1.0).abs() < 2.0 * distance * distance + 1e-3
@@ -156,7 +156,7 @@ fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
         task.xd[5] = 2.0 * way / (f64::from(PAUSE) * 1e-3);
         (carried(&mut rig, &task), task)
     };
-    let length = |task: &TaskState| leg_motion(&config.machine, &task.motion()).length;
+    let length = |task: &TaskState| leg_motion(&config.machine, &task.motion()).length_m;
     let (mut found, mut out_of_steps) = (0.0, 0);
     for k in 14..=20 {
         let (output, task) = after(f64::from(k) * 5e-4);

@@ -72,7 +72,7 @@ fn small_motions_stay_on_their_mode() {
         for step in 0..=200 {
             let phase = f64::from(step) * PI / 50.0;
             let (a, b) = (phase.sin() * size, (1.0 - phase.cos()) * 0.5 * size);
-            let shift = Vector3::new(b, -a, a) * dietmaier.joints.radius;
+            let shift = Vector3::new(b, -a, a) * dietmaier.joints.radius_m;
             let there = mode.pose().displaced(&Twist { angular: Vector3::new(a, b, -b), linear: shift });
             let lengths = leg_lengths(&dietmaier, &there);
             assert_eq!(tracker.find(&dietmaier, &lengths).0, TrackingResult::Found, "mode {k}");

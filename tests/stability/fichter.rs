@@ -27,8 +27,8 @@ pub fn motion_base(condition: f64) -> Config {
     machine.home = at(AT_HOME).x.into();
     machine.joints = Legs::of(machine).joints(&machine.home);
     let actuator = &mut machine.actuator;
-    (actuator.min_length, actuator.max_length) = (0.9, 4.0);
-    (actuator.max_rate, actuator.max_force) = (5.0, 1e9);
+    (actuator.min_length_m, actuator.max_length_m) = (0.9, 4.0);
+    (actuator.max_rate_m_s, actuator.max_force_n) = (5.0, 1e9);
     config
 }
 
@@ -45,15 +45,15 @@ pub fn reason(output: &Output) -> (State, DiagnosticCode) {
 /// From home to a distance in a time, and back from an instant on.
 pub fn there_and_back(t: f64, time_s: f64, distance: f64, back_s: f64) -> TaskState {
     let (up, down) = (rise(t, time_s), rise(t - back_s, time_s));
-    let s = Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel };
+    let s = Profile { value_share: up.value_share - down.value_share, rate_per_s: up.rate_per_s - down.rate_per_s, accel_per_s2: up.accel_per_s2 - down.accel_per_s2 };
     on_the_way(distance, &s)
 }
 
 /// From home to a distance, along a profile from 0 to 1.
 pub fn on_the_way(distance: f64, s: &Profile) -> TaskState {
     let way = AT_HOME - distance;
-    let mut task = at(AT_HOME - way * s.value);
-    (task.xd[2], task.xdd[2]) = (way * s.rate, way * s.accel);
+    let mut task = at(AT_HOME - way * s.value_share);
+    (task.xd[2], task.xdd[2]) = (way * s.rate_per_s, way * s.accel_per_s2);
     task
 }
 

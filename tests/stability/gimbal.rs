@@ -59,8 +59,8 @@ impl Turn {
 /// Setpoints of a machine as it stands, and of the turned one.
 fn tasks(t: f64, time_s: f64, d: f64, height: f64) -> [TaskState; 2] {
     let s = rise(t, time_s);
-    let (sin, cos) = (TURN * (2.0 * s.value - 1.0)).sin_cos();
-    let turn = Turn { sin, cos, rate: 2.0 * TURN * s.rate, accel: 2.0 * TURN * s.accel };
+    let (sin, cos) = (TURN * (2.0 * s.value_share - 1.0)).sin_cos();
+    let turn = Turn { sin, cos, rate: 2.0 * TURN * s.rate_per_s, accel: 2.0 * TURN * s.accel_per_s2 };
     let task = |turn: Turn, place: Vector3<f64>| {
         let [x, xd, xdd] = turn.angles(d).map(|a| Vector6::new(a.x, a.y, a.z, 0.0, 0.0, 0.0));
         TaskState { x: x + Vector6::new(0.0, 0.0, 0.0, place.x, place.y, place.z), xd, xdd }
@@ -80,7 +80,7 @@ fn configured(home: &TaskState, world: &Matrix3<f64>) -> Config {
         DerivativeLimits { velocity: 2.0, acceleration: 20.0, jerk: 2000.0 };
     let machine = &mut config.machine;
     // The reference bounds the forces, which is not the subject.
-    machine.actuator.max_force *= 10.0;
+    machine.actuator.max_force_n *= 10.0;
     machine.home = home.x.into();
     let legs = Legs::of(machine);
     machine.joints = Legs {
@@ -89,7 +89,7 @@ fn configured(home: &TaskState, world: &Matrix3<f64>) -> Config {
         universal_axis: legs.universal_axis.map(|u| world * u),
     }
     .joints(&machine.home);
-    machine.gravity = world * machine.gravity;
+    machine.gravity_m_s2 = world * machine.gravity_m_s2;
     config
 }
 
@@ -104,7 +104,7 @@ fn forces(time_s: f64, d: f64) -> [Vec<[f64; 6]>; 2] {
         rig.engage(&home[which]);
         let cycle = |k: u32| {
             let task = tasks(f64::from(k) * 1e-3, time_s, d, height)[which];
-            let Output { state, diagnostic, force, .. } = rig.cycle(&rig.input(&task));
+            let Output { state, diagnostic, command_n: force, .. } = rig.cycle(&rig.input(&task));
             assert_eq!((state, diagnostic.code), (State::Active, DiagnosticCode::None), "{d} rad, cycle {k}");
             force
         };

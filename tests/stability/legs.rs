@@ -45,7 +45,7 @@ const SPEED: f64 = 0.3;
 fn beside_the_axis_of_its_joint_a_leg_spins_as_predicted() {
     let machine = deployed("motion_base").machine;
     let length = leg_lengths(&machine, &machine.home_pose())[0];
-    let inertia = machine.cylinder.axial_inertia + machine.rod.axial_inertia;
+    let inertia = machine.cylinder.axial_inertia_kg_m2 + machine.rod.axial_inertia_kg_m2;
     let predicted = |e: f64| 0.572_433 * inertia * (SPEED / length).powi(2) / (e.powi(3) * length);
     for beside in [1e-2, 1e-3, 1e-4, 1e-5] {
         let ratio = spin_at_most(beside) / predicted(beside);
@@ -100,9 +100,9 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
                 output.active_limits.contains(Limit::Force)
                     || output.active_limits.contains(Limit::ForceRate),
             );
-            most = most.max(largest(&output.force));
+            most = most.max(largest(&output.command_n));
         }
-        assert!(most <= config.machine.actuator.max_force);
+        assert!(most <= config.machine.actuator.max_force_n);
         assert_eq!([cut > 0, has_stopped], [beside < 1e-2; 2], "{fidelity:?} {beside:e}: {cut} cycles");
     }
 }
@@ -148,7 +148,7 @@ fn a_leg_of_next_to_no_length_loses_what_its_length_says() {
         let start = KinematicState::new(&machine, machine.home_pose());
         for (share, outcome) in [(0.5, Outcome::Solved), (1.0 / small, Outcome::LeftTrustedRegion)] {
             let mut there = machine.home_pose();
-            there.position.x += share * trusted(length) * length * machine.joints.radius;
+            there.position.x += share * trusted(length) * length * machine.joints.radius_m;
             let mut kinematic_state = start;
             let report = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there));
             assert_eq!(report.outcome, outcome, "{length:e} {share}");
@@ -181,7 +181,7 @@ fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
         assert!((ratio - 1.0).abs() < 0.02, "{angle:e}: {ratio}");
         let machine = nearly_parallel(angle);
         let mut kinematic_state = KinematicState::new(&machine, machine.home_pose());
-        let step = 0.5 * kinematic_state.sensitivity().trusted_step * machine.joints.radius;
+        let step = 0.5 * kinematic_state.sensitivity().trusted_step * machine.joints.radius_m;
         let mut there = machine.home_pose();
         there.position.z += step;
         let outcome = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there)).outcome;

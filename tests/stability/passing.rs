@@ -51,7 +51,7 @@ fn run(config: &Config, time_s: f64, distance: f64) -> Run {
         if output.state.has_control() {
             assert!(before(machine, &pose), "{time_s} s, {distance:e}: beyond");
             run.condition = run.condition.max(KinematicState::new(machine, pose).sensitivity().condition);
-            run.force = run.force.max(largest(&output.force));
+            run.force = run.force.max(largest(&output.command_n));
             let resting = Motion { pose, ..TaskState::default().motion() };
             run.holding = run.holding.max(largest(&inverse_dynamics::<Exact>(machine, &resting).unwrap()));
         }
@@ -169,7 +169,7 @@ fn drives_that_are_too_weak_on_the_way_are_told_and_end_in_a_stop() {
         for distance in [0.15, 0.1, 0.05] {
             let what = format!("{distance} rad, {time_s} s");
             let mut config = motion_base(ANY);
-            config.machine.actuator.max_force = 20e3;
+            config.machine.actuator.max_force_n = 20e3;
             let more = (0..)
                 .position(|k| {
                     let task = there_and_back(f64::from(k) * 1e-3, time_s, distance, time_s);
@@ -193,22 +193,22 @@ fn what_limited_forces_leave_out_is_told_as_a_wrench() {
     let home = on_the_way(AT_HOME, &Profile::default());
     let held = largest(&inverse_dynamics::<Exact>(&config.machine, &home.motion()).unwrap());
     let mut heavier = config.machine.clone();
-    heavier.platform.mass *= 1.4;
+    heavier.platform.mass_kg *= 1.4;
     let mut strong = Rig::new(&config, &heavier);
-    config.machine.actuator.max_force = held / 0.85;
+    config.machine.actuator.max_force_n = held / 0.85;
     let mut rig = Rig::new(&config, &heavier);
     rig.engage(&home);
     strong.engage(&home);
     for _ in 0..10_000 {
         let (output, wanted) = (rig.cycle(&rig.input(&home)), strong.cycle(&strong.input(&home)));
         if output.active_limits.contains(Limit::Force) {
-            let more = Vector6::from(output.force) - Vector6::from(wanted.force);
+            let more = Vector6::from(output.command_n) - Vector6::from(wanted.command_n);
             let wrench = leg_wrenches(&config.machine, &home.motion().pose) * more;
             let apart = (output.wrench_error.vector() - wrench).norm() / wrench.norm();
             assert!(wrench.norm() > 10.0 && apart < 0.01, "{apart}: {wrench} {:?}", output.wrench_error);
             return;
         }
-        assert_eq!((output.force, output.wrench_error), (wanted.force, Wrench::default()));
+        assert_eq!((output.command_n, output.wrench_error), (wanted.command_n, Wrench::default()));
     }
     panic!("the forces have not parted");
 }

@@ -63,13 +63,13 @@ fn is_permitted(machine: &Machine, pose: Pose, most_condition: f64) -> bool {
     let is_in_stroke = state.lengths(machine).iter().all(|length| machine.actuator.margin(*length) >= 0.0);
     let Sensitivity { condition, determinant, .. } = *state.sensitivity();
     let is_on_side = determinant * home.sensitivity().determinant > 0.0;
-    turn < machine.max_rotation && is_in_stroke && condition < most_condition && is_on_side
+    turn < machine.max_rotation_rad && is_in_stroke && condition < most_condition && is_on_side
 }
 
 /// The first of 100,000 random poses that are in the stroke, as far from home as the joints permit, and well conditioned. `spread` is
 /// their largest turn about each axis \[rad\] and their largest shift in strokes, at most in radii.
 fn permitted(machine: &Machine, most: usize, spread: [f64; 2]) -> Vec<[f64; 6]> {
-    let radius = machine.joints.radius;
+    let radius = machine.joints.radius_m;
     // Short strokes permit little of the rest.
     let share = (machine.actuator.stroke() / radius).min(1.0);
     let drawn = (0..100_000_u64).map(|number| {
@@ -119,14 +119,14 @@ fn starts(name: &str, machine: &Machine, most: usize, spread: [f64; 2]) -> [usiz
 fn scattered(number: usize) -> Machine {
     let mut machine = machine(MACHINES[number % MACHINES.len()]);
     let (mut random, mut legs) = (Random::new(number as u64), Legs::of(&machine));
-    let size = 0.3 * machine.joints.radius;
+    let size = 0.3 * machine.joints.radius_m;
     for joint in legs.base.iter_mut().chain(&mut legs.platform) {
         *joint += Vector3::from_fn(|_, _| size * random.signed());
     }
     machine.joints = legs.joints(&machine.home);
     let lengths = leg_lengths(&machine, &machine.home_pose());
-    machine.actuator.min_length = 0.7 * lengths.iter().copied().fold(f64::INFINITY, f64::min);
-    machine.actuator.max_length = 1.4 * lengths.iter().copied().fold(0.0, f64::max);
+    machine.actuator.min_length_m = 0.7 * lengths.iter().copied().fold(f64::INFINITY, f64::min);
+    machine.actuator.max_length_m = 1.4 * lengths.iter().copied().fold(0.0, f64::max);
     machine
 }
 
@@ -150,7 +150,7 @@ fn no_start_takes_another_pose_than_the_true_one_in_a_long_search() {
     let most = if Certificate::is_long() { 10_000 } else { 500 };
     for name in MACHINES {
         for max_rotation in [30.0, 50.0] {
-            let machine = Machine { max_rotation: f64::to_radians(max_rotation), ..machine(name) };
+            let machine = Machine { max_rotation_rad: f64::to_radians(max_rotation), ..machine(name) };
             starts(&format!("{name}, {max_rotation} deg"), &machine, most, WIDE);
         }
     }
@@ -171,7 +171,7 @@ fn poses_of_the_long_search_are_among_those_of_their_lengths() {
     assert!(!is_missing(&usual, &x));
     // One turned by 30.2 degrees is excluded, unless the joints permit it.
     let x = [0.3366, -0.2894, -0.2411, -2.3233, -0.3909, 0.0827];
-    assert!(is_missing(&usual, &x) && !is_missing(&Machine { max_rotation: 0.6, ..usual }, &x));
+    assert!(is_missing(&usual, &x) && !is_missing(&Machine { max_rotation_rad: 0.6, ..usual }, &x));
 }
 
 #[test]
@@ -195,14 +195,14 @@ fn every_permitted_pose_that_numpy_finds_is_found() {
     let Ok(python) = environment(&packages).inspect_err(|why| lacking(why)) else { return };
     let (folder, script) = (TempDir::new().unwrap(), data("../stability/permitted_poses", "py"));
     let file = folder.path().join("case.json");
-    let wide = |machine| Machine { max_rotation: f64::to_radians(50.0), ..machine };
+    let wide = |machine| Machine { max_rotation_rad: f64::to_radians(50.0), ..machine };
     let [fried, random] = [machine("fried2008"), scattered(9)].map(wide);
     for machine in [fried, random, machine("motion_base"), machine("tsai2000"), scattered(0)] {
         let (Legs { base, platform, .. }, home) = (Legs::of(&machine), machine.home_pose());
         let poses = permitted(&machine, 200, WIDE);
         let lengths: Vec<_> = poses.into_iter().map(|x| leg_lengths(&machine, &rigid(x))).collect();
         let arms = platform.map(|arm| home.rotation * arm);
-        let case = json!([base, arms, home.position, machine.max_rotation, lengths]);
+        let case = json!([base, arms, home.position, machine.max_rotation_rad, lengths]);
         fs::write(&file, case.to_string()).unwrap();
         let theirs = output(Command::new(python.join("bin/python")).arg(&script).arg(&file)).unwrap();
         let ours: Vec<_> = lengths.iter().map(|lengths| permitted_modes(&machine, lengths).poses).collect();

@@ -7,7 +7,7 @@ use super::*;
 
 /// Half of the delay is not known to the estimator.
 fn sampled_loop(damping_ratio: f64, delay: f64) -> SampledLoop {
-    SampledLoop { wn_t: f64::NAN, damping_ratio, known_delay: 0.5 * delay, delay, ..SampledLoop::default() }
+    SampledLoop { wn_t: f64::NAN, damping_ratio, known_delay_periods: 0.5 * delay, delay_periods: delay, ..SampledLoop::default() }
 }
 
 const DELAYS: [f64; 4] = [0.0, 0.6, 2.0, 3.3];
@@ -15,7 +15,7 @@ const DELAYS: [f64; 4] = [0.0, 0.6, 2.0, 3.3];
 /// No gravity: nothing but the push moves the platform.
 fn in_space() -> Config {
     let mut config = deployed("fried2008");
-    config.machine.gravity.fill(0.0);
+    config.machine.gravity_m_s2.fill(0.0);
     config
 }
 
@@ -23,7 +23,7 @@ fn in_space() -> Config {
 /// be steady at the push.
 fn steady(damping_ratio: f64, delay: f64) -> SampledLoop {
     let sampled = sampled_loop(damping_ratio, delay);
-    SampledLoop { known_delay: sampled.known_delay.min(0.9), ..sampled }
+    SampledLoop { known_delay_periods: sampled.known_delay_periods.min(0.9), ..sampled }
 }
 
 fn at(share: f64, sampled: SampledLoop) -> SampledLoop {
@@ -61,7 +61,7 @@ fn as_predicted(sampled: SampledLoop, factor: f64) -> [DiagnosticCode; 2] {
     let period_s = config.deployment.realtime.period_s();
     let cycles = (factor.ln() / sampled.spectral_radius().ln().abs()) as usize + 5;
     let predicted = sampled.response(0.0, PUSH * period_s, cycles);
-    [0.0, sampled.known_delay].map(|age| {
+    [0.0, sampled.known_delay_periods].map(|age| {
         let mut delayed = Delayed::new(&config, &Setup { age, ..Setup::of(sampled) });
         let (found, cause) = delayed.run(cycles);
         assert_eq!((cause, found.len()), (DiagnosticCode::None, cycles), "{sampled:?}");
@@ -124,7 +124,7 @@ fn the_bound_of_the_configuration_is_the_limit_with_the_longest_delay() {
         let largest = bound.split_once(' ').unwrap().0.parse().unwrap();
         let config = Config::parse(&text(largest), "most").unwrap();
         let sampled = config.deployment.realtime.sampled_loop(largest, 1.0, 0.0);
-        assert_eq!(sampled.delay, if release == "sleep" { 2.1 } else { 1.0 });
+        assert_eq!(sampled.delay_periods, if release == "sleep" { 2.1 } else { 1.0 });
         let found = boundary(&config, &sampled);
         assert!((found / sampled.wn_t - 1.0).abs() < 0.01, "{found} {sampled:?}");
     }
@@ -135,7 +135,7 @@ fn the_bound_of_the_configuration_is_the_limit_with_the_longest_delay() {
 fn a_mass_that_is_wrong_is_stable_and_sags_as_predicted() {
     let mut config = deployed("fried2008");
     // With little weight: whatever the mass, the following limits are far.
-    config.machine.gravity *= 0.1;
+    config.machine.gravity_m_s2 *= 0.1;
     let home = TaskState::at_rest(config.machine.home).motion();
     let falls = ForwardDynamics::new(&config.machine)
         .acceleration(&home.pose, &home.twist, &[0.0; LEGS])
@@ -199,10 +199,10 @@ fn noise_and_steps_of_the_sensors_make_the_error_that_is_predicted() {
             // Steps of twice the noise hide it well: their error is as good as noise of its own.
             for steps in [0.0, 2.0] {
                 let sensor = SensorErrors {
-                    length_noise: noise[0],
-                    rate_noise: noise[1],
-                    length_step: steps * noise[0],
-                    rate_step: steps * noise[1],
+                    length_noise_m: noise[0],
+                    rate_noise_m_s: noise[1],
+                    length_step_m: steps * noise[0],
+                    rate_step_m_s: steps * noise[1],
                 };
                 let deviations = noise.map(|noise| noise * (1.0 + steps * steps / 12.0).sqrt());
                 let predicted = predicted_noise(&config, &sampled, deviations);

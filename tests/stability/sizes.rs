@@ -13,7 +13,7 @@ const ALIKE: f64 = 10.0;
 /// `offset` radii along every axis of the platform.
 fn sized(radius: f64, offset: f64) -> Machine {
     let mut sized = machine("motion_base");
-    let scale = radius / sized.joints.radius;
+    let scale = radius / sized.joints.radius_m;
     let moved = Vector3::repeat(offset * radius);
     let legs = Legs::of(&sized);
     for x in sized.home.iter_mut().skip(3) {
@@ -25,12 +25,12 @@ fn sized(radius: f64, offset: f64) -> Machine {
         universal_axis: legs.universal_axis,
     }
     .joints(&sized.home);
-    sized.platform.center_of_mass = sized.platform.center_of_mass * scale - moved;
+    sized.platform.center_of_mass_m = sized.platform.center_of_mass_m * scale - moved;
     sized.platform.inertia *= scale * scale;
     for link in [&mut sized.cylinder, &mut sized.rod] {
-        link.center_of_mass *= scale;
-        link.axial_inertia *= scale * scale;
-        link.transverse_inertia.constant *= scale * scale;
+        link.center_of_mass_m *= scale;
+        link.axial_inertia_kg_m2 *= scale * scale;
+        link.transverse_inertia.constant_kg_m2 *= scale * scale;
     }
     sized
 }
@@ -39,7 +39,7 @@ fn sized(radius: f64, offset: f64) -> Machine {
 fn pose_errors(radius: f64, offset: f64) -> Errors {
     let (machine, centered) = (&sized(radius, offset), sized(radius, 0.0));
     let mut errors = Errors::default();
-    let r = machine.joints.radius;
+    let r = machine.joints.radius_m;
     let center = Legs::of(machine).platform.iter().sum::<Vector3<f64>>() / 6.0;
     for number in 0..2000 {
         // In radians; shifts are three tenths of the radius.

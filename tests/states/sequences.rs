@@ -147,11 +147,11 @@ impl Watched {
             Wrong::NoSetpoint => input.setpoint = self.last.setpoint,
             Wrong::NoMeasurement => input.measurement = self.last.measurement,
             Wrong::NanSetpoint => setpoint.task.xd[3] = f64::NAN,
-            Wrong::NanMeasurement => measured.rate.get_or_insert_default()[3] = f64::NAN,
+            Wrong::NanMeasurement => measured.rate_m_s.get_or_insert_default()[3] = f64::NAN,
             Wrong::OldSetpoint => setpoint.time_ns -= 1_000_000_000,
             Wrong::OldMeasurement => measured.time_ns -= 1_000_000_000,
             Wrong::FarSetpoint => setpoint.task.x[4] += 0.03,
-            Wrong::FarMeasurement => measured.length[4] += 0.03,
+            Wrong::FarMeasurement => measured.length_m[4] += 0.03,
             Wrong::DeadlineMissed => input.overrun_is_fault = true,
         }
         input
@@ -172,12 +172,12 @@ impl Watched {
             _ => {}
         }
         // A force only under control, finite, within its limits.
-        assert!(has || now.force == [0.0; 6]);
-        assert!(largest(&now.force) <= CONFIG.machine.actuator.max_force);
-        assert!(now.force.iter().all(|force| force.is_finite()));
+        assert!(has || now.command_n == [0.0; 6]);
+        assert!(largest(&now.command_n) <= CONFIG.machine.actuator.max_force_n);
+        assert!(now.command_n.iter().all(|force| force.is_finite()));
         if had && has {
             let most = CONFIG.deployment.limits.force_rate_n_s * 1e-3;
-            let step: [f64; 6] = core::array::from_fn(|leg| now.force[leg] - before.force[leg]);
+            let step: [f64; 6] = core::array::from_fn(|leg| now.command_n[leg] - before.command_n[leg]);
             assert!(largest(&step) <= most * (1.0 + 1e-9), "{step:?}");
         }
         // Out of a fault only by clear; under control only by engage or park, after that.
@@ -241,7 +241,7 @@ proptest! {
             let mut rig = watched.rig.clone();
             rig.ask(request);
             let output = rig.controller.step(&Input { request: rig.asked, ..watched.last });
-            prop_assert!(!output.state.has_control() && output.force == [0.0; 6]);
+            prop_assert!(!output.state.has_control() && output.command_n == [0.0; 6]);
         }
     }
 }
@@ -307,7 +307,7 @@ fn off_and_estop_let_go_within_the_cycle_from_every_state() {
                     if stays { State::Fault } else { State::Off },
                     "{state:?} {request:?}"
                 );
-                assert_eq!(output.force, [0.0; 6]);
+                assert_eq!(output.command_n, [0.0; 6]);
                 assert_eq!(output.answered_message, rig.asked.unwrap().message);
             }
         }

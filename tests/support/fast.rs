@@ -31,7 +31,7 @@ impl Fast {
 
     /// How long it takes \[s\].
     pub fn duration(&self) -> f64 {
-        self.scene.duration / self.speed
+        self.scene.duration_s / self.speed
     }
 
     /// At rest at home before and after.
@@ -53,13 +53,13 @@ impl Fast {
         let (position, orientation) = (&limits.reference.position, &limits.reference.orientation);
         let within = |value: f64, limit: f64| value <= SHARE * limit;
         motions.iter().zip(&forces).all(|(motion, force)| {
-            let rate = leg_motion(machine, motion).rate;
+            let rate = leg_motion(machine, motion).rate_m_s;
             within(motion.twist.linear.norm(), position.velocity)
                 && within(motion.twist.angular.norm(), orientation.velocity)
                 && within(motion.acceleration.linear.norm(), position.acceleration)
                 && within(motion.acceleration.angular.norm(), orientation.acceleration)
-                && rate.iter().all(|rate| within(rate.abs(), machine.actuator.max_rate))
-                && force.iter().all(|force| within(force.abs(), machine.actuator.max_force))
+                && rate.iter().all(|rate| within(rate.abs(), machine.actuator.max_rate_m_s))
+                && force.iter().all(|force| within(force.abs(), machine.actuator.max_force_n))
         }) && motions.windows(2).all(|pair| {
             let [before, after] = [pair[0].acceleration, pair[1].acceleration];
             within((after.linear - before.linear).norm() / dt, position.jerk)

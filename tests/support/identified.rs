@@ -11,15 +11,15 @@ pub fn drawn(file: &Machine, random: &mut Random) -> Machine {
     let mut off = |ratio: f64| 1.0 + ratio * random.signed();
     let mut machine = file.clone();
     let (platform, actuator) = (&mut machine.platform, &mut machine.actuator);
-    platform.mass *= off(0.3);
-    platform.center_of_mass += Vector3::from_fn(|_, _| 0.1 * file.joints.radius * (off(1.0) - 1.0));
+    platform.mass_kg *= off(0.3);
+    platform.center_of_mass_m += Vector3::from_fn(|_, _| 0.1 * file.joints.radius_m * (off(1.0) - 1.0));
     platform.inertia *= off(0.3);
-    machine.rod.mass *= off(0.1);
-    actuator.reflected_mass = (actuator.reflected_mass + 0.01 * file.platform.mass) * off(0.3);
-    let most = actuator.max_force;
-    actuator.coulomb_friction = core::array::from_fn(|_| 0.008 * most * off(0.5));
-    actuator.viscous_friction = core::array::from_fn(|_| 0.02 * most / actuator.max_rate * off(0.5));
-    actuator.load_friction = core::array::from_fn(|_| 0.015 * off(0.9));
+    machine.rod.mass_kg *= off(0.1);
+    actuator.reflected_mass_kg = (actuator.reflected_mass_kg + 0.01 * file.platform.mass_kg) * off(0.3);
+    let most = actuator.max_force_n;
+    actuator.coulomb_friction_n = core::array::from_fn(|_| 0.008 * most * off(0.5));
+    actuator.viscous_friction_n_s_m = core::array::from_fn(|_| 0.02 * most / actuator.max_rate_m_s * off(0.5));
+    actuator.load_friction_share = core::array::from_fn(|_| 0.015 * off(0.9));
     actuator.force_scale = core::array::from_fn(|_| off(0.05));
     machine
 }
@@ -28,13 +28,13 @@ pub fn drawn(file: &Machine, random: &mut Random) -> Machine {
 pub fn loaded(machine: &Machine, mass: f64, at: Vector3<f64>) -> Machine {
     let mut loaded = machine.clone();
     let body = &machine.platform;
-    let total = body.mass + mass;
-    let center = (body.center_of_mass * body.mass + at * mass) / total;
+    let total = body.mass_kg + mass;
+    let center = (body.center_of_mass_m * body.mass_kg + at * mass) / total;
     let about =
         |r: Vector3<f64>, mass: f64| (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * mass;
     loaded.platform.inertia =
-        body.inertia + about(body.center_of_mass - center, body.mass) + about(at - center, mass);
-    (loaded.platform.mass, loaded.platform.center_of_mass) = (total, center);
+        body.inertia + about(body.center_of_mass_m - center, body.mass_kg) + about(at - center, mass);
+    (loaded.platform.mass_kg, loaded.platform.center_of_mass_m) = (total, center);
     loaded
 }
 
@@ -46,7 +46,7 @@ pub struct Series {
 
 impl Series {
     pub fn new(machine: &Machine, share: f64, random: &mut Random) -> Self {
-        let r = machine.joints.radius;
+        let r = machine.joints.radius_m;
         let size = Vector6::new(0.08, 0.08, 0.08, 0.05 * r, 0.05 * r, 0.05 * r) * share;
         let mut draw = || core::array::from_fn(|_| size.map(|size| size * random.signed()));
         Self { cosine: draw(), sine: draw() }
@@ -79,19 +79,19 @@ pub fn errors(found: &Identification, truth: &Machine) -> Vec<f64> {
         println!("{name:20} {value:.5} +- {deviation:.5}, true {:.5}: {error:.1} deviations", of(truth));
         errors.push(error);
     };
-    check("mass", &|machine| machine.platform.mass);
-    check("mass with rods", &|machine| machine.platform.mass + 6.0 * machine.rod.mass);
+    check("mass", &|machine| machine.platform.mass_kg);
+    check("mass with rods", &|machine| machine.platform.mass_kg + 6.0 * machine.rod.mass_kg);
     for axis in 0..3 {
-        check("centre of mass", &|machine| machine.platform.center_of_mass[axis]);
+        check("centre of mass", &|machine| machine.platform.center_of_mass_m[axis]);
         check("moment of inertia", &|machine| machine.platform.inertia[(axis, axis)]);
     }
     check("product of inertia", &|machine| machine.platform.inertia.m12);
-    check("rod", &|machine| machine.rod.mass);
-    check("reflected mass", &|machine| machine.actuator.reflected_mass);
+    check("rod", &|machine| machine.rod.mass_kg);
+    check("reflected mass", &|machine| machine.actuator.reflected_mass_kg);
     for leg in 0..6 {
-        check("viscous friction", &|machine| machine.actuator.viscous_friction[leg]);
-        check("Coulomb friction", &|machine| machine.actuator.coulomb_friction[leg]);
-        check("load friction", &|machine| machine.actuator.load_friction[leg]);
+        check("viscous friction", &|machine| machine.actuator.viscous_friction_n_s_m[leg]);
+        check("Coulomb friction", &|machine| machine.actuator.coulomb_friction_n[leg]);
+        check("load friction", &|machine| machine.actuator.load_friction_share[leg]);
         check("force scale", &|machine| machine.actuator.force_scale[leg]);
     }
     errors

@@ -69,11 +69,11 @@ impl TrueMotion {
         }
         let machine = rig.simulator().machine();
         let legs = rig.simulator().leg_motion();
-        raise(force, largest(&applied) / machine.actuator.max_force);
-        raise(leg_rate, largest(&legs.rate) / machine.actuator.max_rate);
+        raise(force, largest(&applied) / machine.actuator.max_force_n);
+        raise(leg_rate, largest(&legs.rate_m_s) / machine.actuator.max_rate_m_s);
         raise(condition, KinematicState::new(machine, state.pose).sensitivity().condition);
-        for length in legs.length {
-            *room = room.min(machine.actuator.margin(length) - self.parameters.stroke_margin);
+        for length in legs.length_m {
+            *room = room.min(machine.actuator.margin(length) - self.parameters.stroke_margin_m);
         }
     }
 }

@@ -236,8 +236,8 @@ impl Rig {
         let has_rates = self.rates.are_sent((self.now_ns - START_NS) / self.parameters.period_ns);
         Measurement {
             time_ns: self.now_ns,
-            length,
-            rate: has_rates.then_some(rate),
+            length_m: length,
+            rate_m_s: has_rates.then_some(rate),
             ..Measurement::default()
         }
     }
@@ -275,7 +275,7 @@ impl Rig {
 
     /// One period of the platform, in which the force of an output arrives; the meter expects this reference.
     pub fn apply(&mut self, output: &Output, reference: Option<Motion>) {
-        self.elapse(output.state.has_control().then_some(output.force), reference, output.state);
+        self.elapse(output.state.has_control().then_some(output.command_n), reference, output.state);
     }
 
     /// One period of the platform, in which another force arrives.
@@ -309,7 +309,7 @@ impl Rig {
     /// Engages and plays a motion from home with approach and settling; each cycle goes to `watch`.
     pub fn play(&mut self, scene: &FittedMotion, mut watch: impl FnMut(&Input, &Output)) -> Tracking {
         let timeline =
-            Timeline::new(&self.machine, &self.machine.home.into(), &scene.at(0.0).x, scene.duration);
+            Timeline::new(&self.machine, &self.machine.home.into(), &scene.at(0.0).x, scene.duration_s);
         let start_ns = self.now_ns;
         self.ask(Request::Engage);
         let mut tracking = Tracking::default();
@@ -357,10 +357,10 @@ fn perfect(config: &Config, platform: &Machine, step_s: f64) -> Hardware {
 /// Adds a cycle under control to a stretch.
 pub fn record(stretch: &mut RecordedStretch, input: &Input, output: &Output) {
     let measurement = input.measurement.unwrap();
-    stretch.sent.push(SentForce { release_ns: input.release_ns, force: output.force });
+    stretch.sent.push(SentForce { release_ns: input.release_ns, force_n: output.command_n });
     stretch.measured.push(MeasuredMotion {
         time_ns: measurement.time_ns,
-        length: measurement.length,
+        length_m: measurement.length_m,
         pose: output.platform.unwrap().pose,
         reference: output.reference.unwrap(),
     });

@@ -104,15 +104,15 @@ impl Meter {
         let state = simulator.state();
         let still = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
         let legs = leg_motion(&self.machine, &still);
-        self.last_leg_rate = legs.rate.iter().fold(0.0, |fastest, rate| fastest.max(rate.abs()));
+        self.last_leg_rate = legs.rate_m_s.iter().fold(0.0, |fastest, rate| fastest.max(rate.abs()));
         let [angular, linear] = [&self.parameters.limits.orientation, &self.parameters.limits.position]
             .map(|limits| held_velocity(&self.parameters, limits));
-        let held = linear + angular * self.machine.joints.radius;
-        let leg_rate = (self.last_leg_rate - held) / self.machine.actuator.max_rate;
+        let held = linear + angular * self.machine.joints.radius_m;
+        let leg_rate = (self.last_leg_rate - held) / self.machine.actuator.max_rate_m_s;
         self.extremes.add(Quantity::LegRate, leg_rate, now_ns);
-        self.extremes.add(Quantity::Stroke, self.margin_used(&legs.length), now_ns);
+        self.extremes.add(Quantity::Stroke, self.margin_used(&legs.length_m), now_ns);
         let condition = KinematicState::new(&self.machine, state.pose).sensitivity().condition;
-        self.extremes.add(Quantity::Condition, condition / self.parameters.condition, now_ns);
+        self.extremes.add(Quantity::Condition, condition / self.parameters.max_condition, now_ns);
         if self.parameters.envelope.is_some() {
             let excess = self.envelope_excess(&state.pose);
             self.extremes.add(Quantity::Envelope, self.farther_beyond(&excess), now_ns);
@@ -194,9 +194,9 @@ impl Meter {
 
     fn check_distance(&mut self, expected: &Pose, actual: &Pose, now_ns: u64) {
         let quantity = if self.state == State::Engaging { Quantity::Engaging } else { Quantity::Following };
-        let position = (actual.position - expected.position).norm() / self.parameters.following_position;
+        let position = (actual.position - expected.position).norm() / self.parameters.following_position_m;
         let orientation =
-            angle_between(&actual.rotation, &expected.rotation) / self.parameters.following_orientation;
+            angle_between(&actual.rotation, &expected.rotation) / self.parameters.following_orientation_rad;
         self.extremes.add(quantity, position.max(orientation), now_ns);
     }
 
@@ -219,14 +219,14 @@ impl Meter {
         let Parameters { limits, law, .. } = &self.parameters;
         // A difference of velocity goes on for the time constant of the loop.
         let held = |limits: &DerivativeLimits, gains: &Gains| {
-            held_velocity(&self.parameters, limits) / gains.stiffness.sqrt()
+            held_velocity(&self.parameters, limits) / gains.kp_per_s2.sqrt()
         };
         let angle = ENVELOPE_ALLOWANCE_RAD + held(&limits.orientation, &law.orientation);
         let distance = ENVELOPE_ALLOWANCE_M + held(&limits.position, &law.position);
         let room_m = ROOM_RATIO * self.machine.actuator.stroke();
         let farther = excess.iter().enumerate().map(|(axis, excess)| {
             let (allowed, room) =
-                if axis < 3 { (angle, room_m / self.machine.joints.radius) } else { (distance, room_m) };
+                if axis < 3 { (angle, room_m / self.machine.joints.radius_m) } else { (distance, room_m) };
             let began = self.beyond.envelope[axis];
             (excess - began - if began > 0.0 { room } else { 0.0 }) / allowed
         });
@@ -241,11 +241,11 @@ impl Meter {
     /// Part of the margin that is used \[m\]; negative outside of it.
     fn margin_excess(&self, lengths: &[f64; LEGS]) -> f64 {
         let margins = lengths.map(|length| self.machine.actuator.margin(length));
-        self.parameters.stroke_margin - margins.into_iter().fold(f64::INFINITY, f64::min)
+        self.parameters.stroke_margin_m - margins.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     fn margin_unit_m(&self) -> f64 {
-        self.parameters.stroke_margin.max(SMALLEST_MARGIN_M)
+        self.parameters.stroke_margin_m.max(SMALLEST_MARGIN_M)
     }
 }
 

@@ -91,7 +91,7 @@ fn joint_space_adds_each_leg_as_a_serial_robot() {
         let width = plain.header.len();
         assert_eq!(ours.rows[index][..width], plain.rows[index]);
         let legs = joint_space(&machine, motion, &plain.legs(index, "force"));
-        let expected = legs.map(|LegDynamics { mass: m, bias: b, accel: a, contact_force: f }| {
+        let expected = legs.map(|LegDynamics { mass: m, bias: b, accel: a, contact_force_n: f }| {
             [m.x, m.y, m.z, b.x, b.y, b.z, a.x, a.y, f.x, f.y, f.z]
         });
         for (k, stem) in stems.iter().enumerate() {

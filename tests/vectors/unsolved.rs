@@ -67,7 +67,7 @@ fn no_row_may_be_solvable() {
     assert_eq!(ran.complete_table().rows.len(), 10);
     // Within the stroke, but of no platform: one leg would pull all joints beyond the others.
     let machine = machine("fried2008");
-    let (min, max) = (machine.actuator.min_length, machine.actuator.max_length);
+    let (min, max) = (machine.actuator.min_length_m, machine.actuator.max_length_m);
     let ran = with_lengths("fried2008", &[(2, [max, min, max, min, max, min])], &[]);
     let message = "hexad: 1 of 10 rows did not converge (column converged), the first at t = 0.002\n";
     assert_eq!((ran.code, ran.message.as_str()), (Some(1), message));

@@ -39,7 +39,7 @@ fn maps_tables_and_numbers_are_written() {
         assert!(line.chars().count() <= 120, "{line}");
     }
     let machine = deployed("motion_base").machine;
-    let judged = PoseEvaluator::new(&machine, AccelerationDemand { linear: 2.0, angular: 9.4 });
+    let judged = PoseEvaluator::new(&machine, AccelerationDemand { linear_m_s2: 2.0, angular_rad_s2: 9.4 });
     for plane in ["x-y", "x-z", "alpha-beta"] {
         let svg = fs::read_to_string(folder.path().join(plane).with_extension("svg")).unwrap();
         for words in ["stroke margin [mm]", "condition", "payload [kg]", "home", "prefers-color-scheme"] {
@@ -53,11 +53,11 @@ fn maps_tables_and_numbers_are_written() {
             let quality = judged.quality(&TaskState { x, ..TaskState::default() }.motion().pose);
             for (column, value) in [
                 ("in_reach", f64::from(u8::from(quality.within_reach()))),
-                ("stroke_margin", quality.stroke_margin),
+                ("stroke_margin", quality.stroke_margin_m),
                 ("determinant", quality.determinant),
                 ("condition", quality.condition),
-                ("worst_force", quality.worst_force),
-                ("payload", quality.payload),
+                ("worst_force", quality.worst_force_n),
+                ("payload", quality.payload_kg),
             ] {
                 assert_eq!(table.number(row, column), value, "{column} in row {row} of {plane}");
             }

@@ -25,7 +25,7 @@ fn the_usable_region_is_searched_to_its_edge() {
     assert!(long.ambiguous_from_rad <= short.ambiguous_from_rad && long.at_home.is_none(), "{long:?}");
     let words = search(&tsai.within_margin(tsai.actuator.stroke()), 200).to_string();
     assert!(words.ends_with("none found up to 0 deg (searched, 1 poses)"), "home is not usable: {words}");
-    let words = search(&Machine { max_rotation: FRAC_PI_2, ..tsai }, 300).to_string();
+    let words = search(&Machine { max_rotation_rad: FRAC_PI_2, ..tsai }, 300).to_string();
     assert!(words.starts_with("at home 48.7 deg and 1.14 m away; in the usable region from "), "{words}");
     assert!(words.contains("some starts are ambiguous from 0 deg of rotation of home on (searched, "));
 }

@@ -24,7 +24,7 @@ fn margin(machine: &Machine, pose: &Pose) -> f64 {
     let lengths = leg_lengths(machine, pose);
     lengths
         .iter()
-        .map(|l| (l - actuator.min_length).min(actuator.max_length - l))
+        .map(|l| (l - actuator.min_length_m).min(actuator.max_length_m - l))
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -67,8 +67,8 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
         let config = deployed(name);
         let machine = &config.machine;
         for turn in [0.0, TURN] {
-            let found = found(&config, &RegionShape::Ball { turn });
-            assert!(found.guaranteed > 0.1 * machine.joints.radius, "{name}: {found:?}");
+            let found = found(&config, &RegionShape::Ball { turn_rad: turn });
+            assert!(found.guaranteed > 0.1 * machine.joints.radius_m, "{name}: {found:?}");
             let bad = (0..SAMPLES).find(|k| !is_fine(&config, &of_ball(machine, *k, found.guaranteed, turn)));
             assert_eq!(bad, None, "{name}: {found:?}");
             // C comes as far along a leg as that leg has stroke left: that is the ball of an orientation.
@@ -97,8 +97,8 @@ fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
         let config = deployed(name);
         let high = nominal_bounds(&config.machine).pose_max;
         let shapes = [
-            RegionShape::Ball { turn: 0.0 },
-            RegionShape::Ball { turn: TURN },
+            RegionShape::Ball { turn_rad: 0.0 },
+            RegionShape::Ball { turn_rad: TURN },
             RegionShape::Box { low: high.map(|x| -x), high },
         ];
         for shape in shapes {
@@ -113,7 +113,7 @@ fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
 #[test]
 fn a_turn_that_home_has_no_room_for_has_no_ball() {
     let config = Config::load(&data("telescope", "toml")).unwrap();
-    let none = found(&config, &RegionShape::Ball { turn: TURN });
+    let none = found(&config, &RegionShape::Ball { turn_rad: TURN });
     let (size, obstacle) = none.violation.unwrap();
     assert!(none.guaranteed == 0.0 && size <= 0.0, "{none:?}");
     assert!(matches!(obstacle, WorkspaceLimit::LegTooShort(_) | WorkspaceLimit::LegTooLong(_)), "{none:?}");
@@ -169,8 +169,8 @@ fn sharpest(names: &[&str], cells: u32, reach: f64, poses: u32) -> (u32, f64) {
     let (mut proved, mut sharpness) = (0, 0.0_f64);
     for name in names {
         let machine = &if *name == "reference" { deployed(name).machine } else { machine(name) };
-        let radius = machine.joints.radius;
-        let shapes = [RegionShape::Ball { turn: 1.0 }, RegionShape::Box { low: [-1.0; 6], high: [1.0; 6] }];
+        let radius = machine.joints.radius_m;
+        let shapes = [RegionShape::Ball { turn_rad: 1.0 }, RegionShape::Box { low: [-1.0; 6], high: [1.0; 6] }];
         for (k, shape) in (0..cells).flat_map(|k| shapes.iter().map(move |shape| (k, shape))) {
             let scales = [0.3, 0.3, 0.3, 0.2 * radius, 0.2 * radius, 0.2 * radius];
             let (place, size) = (numbers(k), numbers(k + cells));

@@ -59,7 +59,7 @@ pub fn test<L: Link>(
         let holding_n =
             holding_n.ok_or(format!("no pose has the lengths {lengths_m:.4?} m: zero the legs"))?;
         for (leg, (section, holding_n)) in file.legs.iter().zip(holding_n).enumerate() {
-            let brake_n = test_load_n(holding_n, machine.actuator.max_force);
+            let brake_n = test_load_n(holding_n, machine.actuator.max_force_n);
             if !section.brake_hold.is_empty() && !is_stopped() {
                 test_leg(bus, devices, data, (leg, section), (holding_n, brake_n))?;
             }

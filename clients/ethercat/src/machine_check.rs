@@ -26,13 +26,13 @@ pub fn contradictions(file: &DrivesFile, machine: &Config) -> Vec<String> {
     }
     for (number, leg) in (1..).zip(&file.legs) {
         let force_n = leg.max_force_n();
-        if force_n < actuator.max_force {
+        if force_n < actuator.max_force_n {
             errors.push(format!(
                 "leg[{number}]: {} thousandths of {} N m are {force_n:.0} N, less than actuator.max_force_n = {} N",
-                leg.max_torque_permille, leg.rated_torque_n_m, actuator.max_force
+                leg.max_torque_permille, leg.rated_torque_n_m, actuator.max_force_n
             ));
         }
-        let (range_m, stroke_m) = (leg.units().range_m(), actuator.max_length - actuator.min_length);
+        let (range_m, stroke_m) = (leg.units().range_m(), actuator.max_length_m - actuator.min_length_m);
         if range_m <= stroke_m + 2.0 * STROKE_TOLERANCE_M {
             errors.push(format!(
                 "leg[{number}]: position_bits = {}: the range of the encoder is {range_m:.3} m, must exceed the stroke of {stroke_m:.3} m \
@@ -50,10 +50,10 @@ const STROKE_TOLERANCE_M: f64 = 0.005;
 /// Lengths outside of the stroke, in words.
 pub fn lengths_outside(lengths_m: [Option<f64>; LEGS], machine: &Config) -> Vec<String> {
     let actuator = &machine.machine.actuator;
-    let (low, high) = (actuator.min_length - STROKE_TOLERANCE_M, actuator.max_length + STROKE_TOLERANCE_M);
+    let (low, high) = (actuator.min_length_m - STROKE_TOLERANCE_M, actuator.max_length_m + STROKE_TOLERANCE_M);
     let found = (1..).zip(lengths_m).filter_map(|(number, length_m)| {
         let length_m = length_m.filter(|length_m| !(low..=high).contains(length_m))?;
-        let (low, high) = (actuator.min_length, actuator.max_length);
+        let (low, high) = (actuator.min_length_m, actuator.max_length_m);
         Some(format!(
             "leg {number}: length {length_m:.4} m is outside of the stroke [{low}, {high}] m: measure its offset again (zero), or \
              correct counts_per_rev or position_bits"

@@ -70,10 +70,10 @@ impl Telemetry<'_> {
         let estimated = motion.map(|motion| leg_lengths_and_rates(machine, &motion.pose, &motion.twist).1);
         let mut joints = ros::JointState {
             header: self.header(measurement.time_ns),
-            name: (1..).zip(measurement.length).map(|(leg, _)| format!("prismatic_{leg}")).collect(),
-            position: measurement.length.into(),
-            velocity: measurement.rate.or(estimated).map(Into::into).unwrap_or_default(),
-            effort: measurement.drives.force.map(Into::into).unwrap_or_default(),
+            name: (1..).zip(measurement.length_m).map(|(leg, _)| format!("prismatic_{leg}")).collect(),
+            position: measurement.length_m.into(),
+            velocity: measurement.rate_m_s.or(estimated).map(Into::into).unwrap_or_default(),
+            effort: measurement.drives.force_n.map(Into::into).unwrap_or_default(),
         };
         let Some(motion) = motion else { return joints };
         let seconds = (measurement.time_ns as i64 - motion.time_ns as i64) as f64 * 1e-9;

@@ -168,7 +168,7 @@ impl CycleMessage {
         (self.setpoint_process, self.setpoint_process_ignored) = (used_pid, ignored_pid);
         let Publishers { used_pid, ignored_pid } = input.measured_publishers;
         (self.measured_process, self.measured_process_ignored) = (used_pid, ignored_pid);
-        if let Some(Setpoint { kind, time_ns, task, target_speed }) = input.setpoint {
+        if let Some(Setpoint { kind, time_ns, task, target_speed_share: target_speed }) = input.setpoint {
             self.setpoint_target_speed = target_speed;
             (self.has_setpoint, self.setpoint_kind, self.setpoint_time_ns) = (1, kind as u32, time_ns);
             [self.setpoint_x, self.setpoint_x_rate, self.setpoint_x_accel] =
@@ -196,10 +196,10 @@ impl CycleMessage {
         let MessageId { epoch, sequence } = output.answered_message;
         (self.answered_epoch, self.answered_sequence) = (epoch, sequence);
         self.request_diagnostic = output.request_diagnostic.into();
-        (self.force_n, self.wrench_error) = (output.force, output.wrench_error.vector().into());
+        (self.force_n, self.wrench_error) = (output.command_n, output.wrench_error.vector().into());
         (self.missed_measurements, self.missed_setpoints) =
             (output.missed_measurements, output.missed_setpoints);
-        if let Some(PlatformState { pose, twist, condition, time_to_singularity }) = &output.platform {
+        if let Some(PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity }) = &output.platform {
             self.has_platform = 1;
             (self.rotation, self.position_m) = pose_numbers(pose);
             self.twist = twist.vector().into();
@@ -236,7 +236,7 @@ impl CycleMessage {
                 xd: self.setpoint_x_rate.into(),
                 xdd: self.setpoint_x_accel.into(),
             },
-            target_speed: self.setpoint_target_speed,
+            target_speed_share: self.setpoint_target_speed,
         };
         let measured = MeasuredMessage {
             length_m: self.measured_length_m,
@@ -283,7 +283,7 @@ impl CycleMessage {
             pose: pose(&self.rotation, &self.position_m),
             twist: Twist::from_vector(&self.twist.into()),
             condition: self.condition,
-            time_to_singularity: self.time_to_singularity_s,
+            time_to_singularity_s: self.time_to_singularity_s,
         };
         let [error_pose, error_twist] =
             [self.error, self.error_rate].map(|numbers| Twist::from_vector(&numbers.into()));
@@ -297,7 +297,7 @@ impl CycleMessage {
             diagnostic: self.diagnostic.diagnostic()?,
             answered_message: MessageId { epoch: self.answered_epoch, sequence: self.answered_sequence },
             request_diagnostic: self.request_diagnostic.diagnostic()?,
-            force: self.force_n,
+            command_n: self.force_n,
             wrench_error: Wrench::from_vector(&self.wrench_error.into()),
             active_limits: LimitSet(self.active_limits),
             missed_measurements: self.missed_measurements,

@@ -39,7 +39,7 @@ impl ForceMessage {
     /// Forces of a cycle that was computed for an instant \[ns\]; valid in the states under control.
     pub fn new(output: &Output, release_ns: u64) -> Self {
         Self {
-            force_n: output.force,
+            force_n: output.command_n,
             valid: u32::from(output.state.has_control()),
             state: output.state as u32,
             diagnostic_code: output.diagnostic.code as u32,
@@ -82,7 +82,7 @@ mod tests {
         let force = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         let mut output = Output {
             diagnostic: DiagnosticCode::SetpointTooFar.into(),
-            force,
+            command_n: force,
             active_limits: LimitSet(6),
             ..Output::default()
         };

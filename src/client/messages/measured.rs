@@ -42,14 +42,14 @@ impl From<&MeasuredMessage> for Measurement {
     fn from(message: &MeasuredMessage) -> Self {
         Self {
             time_ns: message.header.time_ns,
-            length: message.length_m,
-            rate: (message.rates_valid == 1).then_some(message.length_rate_m_s),
+            length_m: message.length_m,
+            rate_m_s: (message.rates_valid == 1).then_some(message.length_rate_m_s),
             pose: (message.pose_valid == 1).then_some(message.x),
             drives: DriveStatus {
                 enabled: message.reported(1, message.drive_enabled),
                 brake_open: message.reported(2, message.brake_open),
                 fault: message.reported(4, message.drive_fault),
-                force: message.reported(8, message.force_n),
+                force_n: message.reported(8, message.force_n),
             },
         }
     }
@@ -66,19 +66,19 @@ impl From<&Measurement> for MeasuredMessage {
     fn from(measurement: &Measurement) -> Self {
         let drives = &measurement.drives;
         Self {
-            length_m: measurement.length,
-            length_rate_m_s: measurement.rate.unwrap_or_default(),
-            rates_valid: u32::from(measurement.rate.is_some()),
+            length_m: measurement.length_m,
+            length_rate_m_s: measurement.rate_m_s.unwrap_or_default(),
+            rates_valid: u32::from(measurement.rate_m_s.is_some()),
             pose_valid: u32::from(measurement.pose.is_some()),
             x: measurement.pose.unwrap_or_default(),
             drive_valid: u32::from(drives.enabled.is_some())
                 | u32::from(drives.brake_open.is_some()) << 1
                 | u32::from(drives.fault.is_some()) << 2
-                | u32::from(drives.force.is_some()) << 3,
+                | u32::from(drives.force_n.is_some()) << 3,
             drive_enabled: drives.enabled.unwrap_or_default(),
             brake_open: drives.brake_open.unwrap_or_default(),
             drive_fault: drives.fault.unwrap_or_default(),
-            force_n: drives.force.unwrap_or_default(),
+            force_n: drives.force_n.unwrap_or_default(),
             ..Self::default()
         }
     }
@@ -90,11 +90,11 @@ mod tests {
 
     #[test]
     fn a_measurement_contains_the_numbers_of_the_message() {
-        let some = DriveStatus { enabled: Some(1), brake_open: None, fault: Some(3), force: None };
-        let others = DriveStatus { enabled: None, brake_open: Some(2), fault: None, force: Some([4.0; 6]) };
+        let some = DriveStatus { enabled: Some(1), brake_open: None, fault: Some(3), force_n: None };
+        let others = DriveStatus { enabled: None, brake_open: Some(2), fault: None, force_n: Some([4.0; 6]) };
         for (rate, drives) in [(None, some), (Some([7.0, 8.0, 9.0, 10.0, 11.0, 12.0]), others)] {
             let length = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-            let measurement = Measurement { time_ns: 42, length, rate, pose: rate, drives };
+            let measurement = Measurement { time_ns: 42, length_m: length, rate_m_s: rate, pose: rate, drives };
             let mut message = MeasuredMessage::from(&measurement);
             message.header.time_ns = 42;
             assert_eq!(Measurement::from(&message), measurement);
@@ -106,7 +106,7 @@ mod tests {
         for mark in [0, 2, u32::MAX] {
             let message = MeasuredMessage { rates_valid: mark, pose_valid: mark, ..Default::default() };
             let found = Measurement::from(&message);
-            assert_eq!((found.rate, found.pose), (None, None), "{mark}");
+            assert_eq!((found.rate_m_s, found.pose), (None, None), "{mark}");
         }
     }
 }

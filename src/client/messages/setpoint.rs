@@ -32,7 +32,7 @@ impl From<&TaskState> for SetpointMessage {
 
 impl From<&Setpoint> for SetpointMessage {
     fn from(setpoint: &Setpoint) -> Self {
-        let target_speed = setpoint.target_speed;
+        let target_speed = setpoint.target_speed_share;
         Self { kind: setpoint.kind as u64, target_speed, ..Self::from(&setpoint.task) }
     }
 }
@@ -42,7 +42,7 @@ impl From<&SetpointMessage> for Setpoint {
         let task = TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() };
         let has_number = |kind: &SetpointKind| *kind as u64 == message.kind;
         let kind = SetpointKind::ALL.into_iter().find(has_number).unwrap_or(SetpointKind::Unknown);
-        Self { kind, time_ns: message.header.time_ns, task, target_speed: message.target_speed }
+        Self { kind, time_ns: message.header.time_ns, task, target_speed_share: message.target_speed }
     }
 }
 
@@ -76,7 +76,7 @@ mod tests {
             (u64::MAX, SetpointKind::Unknown),
         ] {
             let setpoint = Setpoint::from(&message(number));
-            assert_eq!((setpoint.kind, setpoint.time_ns, setpoint.target_speed), (kind, 77, 0.5), "{number}");
+            assert_eq!((setpoint.kind, setpoint.time_ns, setpoint.target_speed_share), (kind, 77, 0.5), "{number}");
             let TaskState { x, xd, xdd } = setpoint.task;
             let numbers: Vec<f64> = x.iter().chain(&xd).chain(&xdd).copied().collect();
             assert_eq!(numbers, (1..=18).map(f64::from).collect::<Vec<_>>());

@@ -24,7 +24,7 @@ pub struct SourceInstant {
     /// On the clock of this host \[ns\].
     pub time_ns: i64,
     /// Of the source's clock: a derivative with respect to its time, times this, is one with respect to real time.
-    pub rate: f64,
+    pub rate_ratio: f64,
 }
 
 /// Why a message has no instant.
@@ -122,7 +122,7 @@ impl SourceClock {
     /// Instant of a stamp.
     pub fn instant(&mut self, stamp_ns: i64, arrival_ns: i64) -> Result<SourceInstant, NoInstant> {
         let line = match (self.rule, &mut self.line) {
-            (ClockRule::Arrival, _) => return Ok(SourceInstant { time_ns: arrival_ns, rate: 1.0 }),
+            (ClockRule::Arrival, _) => return Ok(SourceInstant { time_ns: arrival_ns, rate_ratio: 1.0 }),
             (ClockRule::RealTime, none @ None) => Some(none.insert(Line::new(1.0, REAL_TIME_DRIFT))),
             (_, line) => line.as_mut(),
         };
@@ -277,6 +277,6 @@ impl Line {
         }
         let least_ns = self.least_ns.into_iter().flatten().fold(delay_ns, i64::min);
         self.least_ns[0] = Some(self.least_ns[0].map_or(delay_ns, |known_ns| known_ns.min(delay_ns)));
-        Ok(SourceInstant { time_ns: sent_ns.saturating_add(least_ns), rate: self.rate })
+        Ok(SourceInstant { time_ns: sent_ns.saturating_add(least_ns), rate_ratio: self.rate })
     }
 }

@@ -117,7 +117,7 @@ impl StatusMessage {
             message.x = task_coordinates(&platform.pose, home);
             message.twist = platform.twist.vector().into();
             message.condition = platform.condition;
-            message.time_to_singularity_s = platform.time_to_singularity;
+            message.time_to_singularity_s = platform.time_to_singularity_s;
         }
         if let Some(error) = &output.error {
             message.error_valid = 1;
@@ -170,7 +170,7 @@ mod tests {
             diagnostic: Diagnostic { code: DiagnosticCode::SetpointTooFar, value: 1.0, bound: 2.0, index: 3 },
             answered_message: hexad_core::control::signals::state::MessageId { epoch: 4, sequence: 5 },
             request_diagnostic: Diagnostic::new(DiagnosticCode::NearSingular, 143.0, 100.0).at(6),
-            force: six(10.0),
+            command_n: six(10.0),
             wrench_error: Wrench::from_vector(&Vector6::from(six(20.0))),
             active_limits: LimitSet(6),
             missed_measurements: 7,
@@ -179,7 +179,7 @@ mod tests {
                 pose: TaskState::at_rest(HOME).motion().pose,
                 twist: twist(30.0),
                 condition: 50.0,
-                time_to_singularity: 51.0,
+                time_to_singularity_s: 51.0,
             }),
             error: Some(PoseError { pose: twist(60.0), twist: twist(70.0) }),
             reference: None,

@@ -73,12 +73,12 @@ fn advise(config: &Config, trajectory: Option<(&Path, &NumberTable)>) -> Result<
         Some((path, table)) => judge_trajectory(&model, path, table)?,
         None => judge_envelope(config, &model),
     };
-    let (times, tolerance) = (time(&model, &motions), config.deployment.control.fidelity_tolerance);
+    let (times, tolerance) = (time(&model, &motions), config.deployment.control.fidelity_tolerance_share);
     let (inside, all) = (&comparison.inside, &comparison.all);
     let errors = comparison.errors.iter().zip(times);
     let is_within = |of: Fidelity| comparison.within(tolerance).any(|error| error.fidelity == of);
     let rows = errors
-        .map(|(error, time_ns)| FidelityRow::new(error, time_ns, inside.peak, is_within(error.fidelity)));
+        .map(|(error, time_ns)| FidelityRow::new(error, time_ns, inside.peak_n, is_within(error.fidelity)));
     Ok(AdviceReport {
         schema: SCHEMA,
         machine: config.name.clone(),
@@ -86,8 +86,8 @@ fn advise(config: &Config, trajectory: Option<(&Path, &NumberTable)>) -> Result<
         evaluated: all.evaluated,
         outside_stroke: all.outside,
         singular: all.singular,
-        peak_force_n: all.peak,
-        peak_inside_n: inside.peak,
+        peak_force_n: all.peak_n,
+        peak_inside_n: inside.peak_n,
         max_force_n: config.machine.actuator.available_force(),
         tolerance,
         fidelities: rows.collect(),

@@ -46,7 +46,7 @@ pub fn write_svg(path: &Path, name: &str, machine: &Machine) -> Result<(), Chart
     write_picture(path, head + 2 * CELL_HEIGHT, |root| {
         draw_title(root, &title, 15)?;
         let cells = root.split_vertically(head).1.split_evenly((2, 2));
-        let axes = axes(&machine.gravity);
+        let axes = axes(&machine.gravity_m_s2);
         let joints = joints(machine);
         let views = [View::above(axes), View::side(axes), View::perspective(axes, &joints)];
         cells.iter().zip(&views).try_for_each(|(cell, view)| view.draw(cell, &joints))?;
@@ -198,7 +198,7 @@ fn draw_axes<'a>(
 /// Each leg as a line from its shortest to its longest length, with a disc at its length at home.
 fn draw_strokes(area: &Area, machine: &Machine) -> Result<(), DrawError> {
     let lengths = leg_lengths(machine, &TaskState::at_rest(machine.home).motion().pose);
-    let ends = [machine.actuator.min_length, machine.actuator.max_length];
+    let ends = [machine.actuator.min_length_m, machine.actuator.max_length_m];
     let x = Axis::new("length [m]", ends.into_iter().chain(lengths), 0.08, TICKS);
     let y = Axis::new("leg", [0.5, LEGS as f64 + 0.5].into_iter(), 0.0, LEGS as f64).reversed();
     let mut chart = draw_axes(area, "stroke of each leg; discs: length at home", [x, y], true)?;

@@ -141,7 +141,7 @@ impl CheckReport {
             condition: sensitivity.condition,
             condition_limit: limits.condition,
             rate_hz: deployment.realtime.rate_hz,
-            certain_step_m: sensitivity.trusted_step * machine.joints.radius,
+            certain_step_m: sensitivity.trusted_step * machine.joints.radius_m,
             certain_step_rad: sensitivity.trusted_step,
             other_poses: others.len(),
             permitted_other_poses: others.iter().filter(|mode| mode.is_permitted).count(),
@@ -161,14 +161,14 @@ impl CheckReport {
             estimator_hz: control.estimator_bandwidth_hz,
             compensates_disturbances: control.compensate_disturbances,
             payload_change_kg: constants.disturbance_bounds.max_payload_change_kg,
-            disturbance_step_m_s2: constants.disturbance_bounds.max_sudden_disturbance,
+            disturbance_step_m_s2: constants.disturbance_bounds.max_sudden_acceleration_m_s2,
             available_force_n: machine.actuator.available_force(),
-            max_force_n: machine.actuator.max_force,
-            friction_uncertainty_n: machine.actuator.friction_uncertainty,
+            max_force_n: machine.actuator.max_force_n,
+            friction_uncertainty_n: machine.actuator.friction_uncertainty_n,
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_age_s(deployment),
-            held_pole_per_s: limits.held_pole,
+            held_pole_per_s: limits.held_pole_per_s,
         }
     }
 }
@@ -184,8 +184,8 @@ fn legs(config: &Config) -> Vec<LegAtHome> {
     let values = lengths.into_iter().zip(forces).zip(angles);
     let leg = |((length_m, force_n), joint_axis_deg): (_, f64)| LegAtHome {
         length_m,
-        to_shortest_m: length_m - actuator.min_length,
-        to_longest_m: actuator.max_length - length_m,
+        to_shortest_m: length_m - actuator.min_length_m,
+        to_longest_m: actuator.max_length_m - length_m,
         force_n,
         force_ratio: force_n.map(|force: f64| force.abs() / actuator.available_force()),
         joint_axis_deg,
@@ -197,7 +197,7 @@ fn margins(config: &Config) -> Vec<LoopMargins> {
     let of_loop = |control_loop: ControlLoop| LoopMargins {
         name: control_loop.name,
         bandwidth_hz: control_loop.bandwidth_hz,
-        delay_periods: control_loop.sampled.delay,
+        delay_periods: control_loop.sampled.delay_periods,
         largest_stable_hz: control_loop.largest_stable_hz(),
         gain_margin: control_loop.sampled.gain_margin(),
         longest_delay_periods: control_loop.sampled.longest_delay(),

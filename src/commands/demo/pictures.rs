@@ -178,9 +178,9 @@ impl Signals {
             push(&mut commanded.x, t, degrees(setpoint.x));
             push(&mut commanded.twist, t, degrees(motion.twist.vector().into()));
             push(&mut commanded.acceleration, t, degrees(motion.acceleration.vector().into()));
-            push(&mut commanded.length, t, legs.length);
-            push(&mut commanded.rate, t, legs.rate);
-            push(&mut commanded.accel, t, legs.accel);
+            push(&mut commanded.length, t, legs.length_m);
+            push(&mut commanded.rate, t, legs.rate_m_s);
+            push(&mut commanded.accel, t, legs.accel_m_s2);
             push(&mut commanded.force, t, model.forces::<Exact>(&motion).unwrap_or([f64::NAN; LEGS]));
         }
         // Before the first setpoint there are no commanded values.

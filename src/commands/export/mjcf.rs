@@ -66,7 +66,7 @@ pub(super) fn text(config: &Config) -> String {
 </mujoco>
 "#,
         name = config.name,
-        gravity = Numbers(machine.gravity.as_slice()),
+        gravity = Numbers(machine.gravity_m_s2.as_slice()),
         looks = looks(&shapes),
         scenery = scenery(machine, &shapes),
         platform = platform_body(machine, &legs, &shapes),
@@ -75,7 +75,7 @@ pub(super) fn text(config: &Config) -> String {
         )),
         motors = each(|leg, machine| {
             let i = leg.number;
-            let (most, scale) = (machine.actuator.max_force, leg.of(&machine.actuator.force_scale));
+            let (most, scale) = (machine.actuator.max_force_n, leg.of(&machine.actuator.force_scale));
             format!(
                 "    <motor name=\"force_{i}\" joint=\"prismatic_{i}\" gear=\"{scale:?}\" ctrlrange=\"{:?} {most:?}\"/>\n",
                 -most
@@ -87,10 +87,10 @@ pub(super) fn text(config: &Config) -> String {
 /// Numbers `c q l0` of a link whose transverse inertia varies.
 fn law((name, link): (&str, &Link)) -> String {
     let inertia = &link.transverse_inertia;
-    if inertia.quadratic == 0.0 {
+    if inertia.quadratic_kg == 0.0 {
         return String::new();
     }
-    let data = [inertia.constant, inertia.quadratic, inertia.reference_length];
+    let data = [inertia.constant_kg_m2, inertia.quadratic_kg, inertia.reference_length_m];
     format!("    <numeric name=\"{name}_transverse_inertia\" data=\"{}\"/>\n", Numbers(&data))
 }
 
@@ -116,8 +116,8 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
         orientation = Numbers(&quaternion(rotation)),
         first_axis = Numbers(first_axis.as_slice()),
         cylinder =
-            inertial(machine.cylinder.mass, machine.cylinder.center_of_mass, &machine.cylinder, *length),
-        rod = inertial(machine.rod.mass, -machine.rod.center_of_mass, &machine.rod, *length),
+            inertial(machine.cylinder.mass_kg, machine.cylinder.center_of_mass_m, &machine.cylinder, *length),
+        rod = inertial(machine.rod.mass_kg, -machine.rod.center_of_mass_m, &machine.rod, *length),
         ball = shapes.ball_radius,
         cylinder_radius = shapes.cylinder_radius,
         rod_radius = shapes.rod_radius,
@@ -129,9 +129,9 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
 /// Prismatic joint of a leg, with the friction and the reflected mass of its drive.
 fn prismatic_joint(machine: &Machine, leg: &LegLayout) -> String {
     let (LegLayout { number: i, length, .. }, actuator) = (leg, &machine.actuator);
-    let [shortest, longest] = [actuator.min_length, actuator.max_length];
+    let [shortest, longest] = [actuator.min_length_m, actuator.max_length_m];
     let [reflected, viscous, coulomb] =
-        [actuator.reflected_mass, leg.of(&actuator.viscous_friction), leg.of(&actuator.coulomb_friction)];
+        [actuator.reflected_mass_kg, leg.of(&actuator.viscous_friction_n_s_m), leg.of(&actuator.coulomb_friction_n)];
     format!(
         "<joint name=\"prismatic_{i}\" type=\"slide\" axis=\"0 0 1\" ref=\"{length:?}\" \
          range=\"{shortest:?} {longest:?}\" armature=\"{reflected:?}\" \
@@ -167,8 +167,8 @@ fn platform_body(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
 "#,
         at = Numbers(position.as_slice()),
         orientation = Numbers(&quaternion(&Rotation3::from_matrix_unchecked(rotation))),
-        center = Numbers(body.center_of_mass.as_slice()),
-        mass = body.mass,
+        center = Numbers(body.center_of_mass_m.as_slice()),
+        mass = body.mass_kg,
         inertia = Numbers(&[i.m11, i.m22, i.m33, i.m12, i.m13, i.m23]),
     )
 }
@@ -207,7 +207,7 @@ fn looks(shapes: &Shapes) -> String {
 
 /// The base, a light from above, and a camera that is upright for any direction of gravity.
 fn scenery(machine: &Machine, shapes: &Shapes) -> String {
-    let up = (-machine.gravity).try_normalize(f64::MIN_POSITIVE).unwrap_or(Vector3::z());
+    let up = (-machine.gravity_m_s2).try_normalize(f64::MIN_POSITIVE).unwrap_or(Vector3::z());
     // Any direction that is not up: the base axis that deviates most from it.
     let aside = Vector3::ith(up.iamin(), 1.0);
     let right = aside.cross(&up).normalize();

@@ -40,8 +40,8 @@ pub(super) fn text(config: &Config) -> String {
 {bodies}{platform}</robot>
 "#,
         name = config.name,
-        gravity = Numbers(machine.gravity.as_slice()),
-        reflected = machine.actuator.reflected_mass,
+        gravity = Numbers(machine.gravity_m_s2.as_slice()),
+        reflected = machine.actuator.reflected_mass_kg,
         platform = platform_link(machine, &legs, &shapes),
     )
 }
@@ -80,20 +80,20 @@ fn leg_links(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
     <parent link="rod_{i}"/><child link="ball_rod_{i}"/>
   </joint>
 "#,
-        actuator.min_length,
-        actuator.max_length,
-        actuator.max_force,
-        actuator.max_rate,
-        leg.of(&actuator.viscous_friction),
-        leg.of(&actuator.coulomb_friction),
+        actuator.min_length_m,
+        actuator.max_length_m,
+        actuator.max_force_n,
+        actuator.max_rate_m_s,
+        leg.of(&actuator.viscous_friction_n_s_m),
+        leg.of(&actuator.coulomb_friction_n),
         cylinder_inertial = inertial(
-            cylinder.mass,
-            &Vector3::new(0.0, 0.0, cylinder.center_of_mass),
+            cylinder.mass_kg,
+            &Vector3::new(0.0, 0.0, cylinder.center_of_mass_m),
             &link_inertia(cylinder, *length)
         ),
         cylinder_visual = visual(0.5 * to, shapes.cylinder_radius, to, "cylinder"),
         rod_inertial =
-            inertial(rod.mass, &Vector3::new(0.0, 0.0, -rod.center_of_mass), &link_inertia(rod, *length)),
+            inertial(rod.mass_kg, &Vector3::new(0.0, 0.0, -rod.center_of_mass_m), &link_inertia(rod, *length)),
         rod_visual = visual(-0.5 * to, shapes.rod_radius, to, "rod"),
         at_base = origin(base, rotation),
         first_axis = Numbers(first_axis.as_slice()),
@@ -134,7 +134,7 @@ fn platform_link(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
     {at}
   </joint>
 {balls}"#,
-        inertial = inertial(body.mass, &body.center_of_mass, &realizable(&body.inertia)),
+        inertial = inertial(body.mass_kg, &body.center_of_mass_m, &realizable(&body.inertia)),
         at = origin(&position, &Rotation3::from_matrix_unchecked(rotation)),
     )
 }

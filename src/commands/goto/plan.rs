@@ -51,9 +51,9 @@ impl fmt::Display for PlanText<'_> {
         writeln!(
             f,
             "leg  length mm (stroke {} to {})  largest rate mm/s (of {})",
-            fixed(1e3 * actuator.min_length, digits - 2),
-            fixed(1e3 * actuator.max_length, digits - 2),
-            fixed(1e3 * actuator.max_rate, digits - 2)
+            fixed(1e3 * actuator.min_length_m, digits - 2),
+            fixed(1e3 * actuator.max_length_m, digits - 2),
+            fixed(1e3 * actuator.max_rate_m_s, digits - 2)
         )?;
         for (leg, ([shortest, longest], rate)) in
             (1..=LEGS).zip(motion.lengths_m.iter().zip(motion.leg_rates_m_s))

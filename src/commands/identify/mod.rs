@@ -147,7 +147,7 @@ impl IdentifyArguments {
     fn known_weight(&self) -> Result<Load, Failure> {
         let (Some(mass), Some(at)) = (self.known_mass, self.at) else { return Ok(Load::Empty) };
         if mass > 0.0 && mass.is_finite() {
-            return Ok(Load::Known { mass, at });
+            return Ok(Load::Known { mass_kg: mass, at_m: at });
         }
         Err(Failure::after_start(format_args!("--known-mass = {mass} kg: must be greater than 0")))
     }
@@ -166,7 +166,7 @@ fn runs_of(stretches: &[RecordedStretch], load: Load, delay_s: f64) -> Vec<Run> 
 fn delay(config: &Config, machine: &Machine, stretches: &[RecordedStretch]) -> Delay {
     let mut stretches = stretches.to_vec();
     for sent in stretches.iter_mut().flat_map(|stretch| &mut stretch.sent) {
-        sent.force.iter_mut().zip(machine.actuator.force_scale).for_each(|(force, scale)| *force *= scale);
+        sent.force_n.iter_mut().zip(machine.actuator.force_scale).for_each(|(force, scale)| *force *= scale);
     }
     let found = drive_delay(machine, &stretches);
     let shown = found.filter(|found| {

@@ -35,7 +35,7 @@ pub(super) fn new_values(
 ) -> Vec<NewValue> {
     let estimate = |of: &dyn Fn(&Machine) -> f64| {
         let estimated = found.estimate(|machine, payload| {
-            let none = Platform { mass: 0.0, ..payload.clone() };
+            let none = Platform { mass_kg: 0.0, ..payload.clone() };
             let platform = joined(machine, if has_payload { payload } else { &none });
             of(&Machine { platform, ..machine.clone() })
         });
@@ -56,12 +56,12 @@ pub(super) fn new_values(
     };
     let mut values: Vec<_> = numbers.map(number).collect();
     values.push(array(CENTER, 3, &|machine, axis| {
-        machine.platform.center_of_mass.get(axis).copied().unwrap_or_default()
+        machine.platform.center_of_mass_m.get(axis).copied().unwrap_or_default()
     }));
     for (key, link) in ACROSS {
         // Of a table, the constant part.
         let constant = if has_table(text, key) { format!("{key}.constant_kg_m2") } else { key.into() };
-        values.push(one(&constant, &|machine: &Machine| link(machine).transverse_inertia.constant));
+        values.push(one(&constant, &|machine: &Machine| link(machine).transverse_inertia.constant_kg_m2));
     }
     for (key, _, of) in LEG_QUANTITIES {
         values.push(array(key, LEGS, &|machine, leg| of(machine).get(leg).copied().unwrap_or_default()));
@@ -79,15 +79,15 @@ pub(super) fn new_values(
 /// Platform and payload as one body.
 fn joined(machine: &Machine, payload: &Platform) -> Platform {
     let platform = &machine.platform;
-    let mass = platform.mass + payload.mass;
+    let mass = platform.mass_kg + payload.mass_kg;
     let center_of_mass =
-        (platform.center_of_mass * platform.mass + payload.center_of_mass * payload.mass) / mass;
+        (platform.center_of_mass_m * platform.mass_kg + payload.center_of_mass_m * payload.mass_kg) / mass;
     let about = |body: &Platform| {
-        let r: Vector3<f64> = body.center_of_mass - center_of_mass;
+        let r: Vector3<f64> = body.center_of_mass_m - center_of_mass;
         let point = Matrix3::identity() * r.norm_squared() - r * r.transpose();
-        (if body.mass > 0.0 { body.inertia } else { Matrix3::zeros() }) + point * body.mass
+        (if body.mass_kg > 0.0 { body.inertia } else { Matrix3::zeros() }) + point * body.mass_kg
     };
-    Platform { mass, center_of_mass, inertia: about(platform) + about(payload) }
+    Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia: about(platform) + about(payload) }
 }
 
 /// Friction that the new file may lack \[N\], rounded up.
@@ -96,7 +96,7 @@ fn unstated_friction(found: &Identification) -> f64 {
     let home = TaskState::at_rest(machine.home).motion();
     let held = inverse_dynamics::<Gravity>(machine, &home).unwrap_or_default();
     let actuator = &machine.actuator;
-    let legs = actuator.coulomb_friction.iter().zip(&actuator.load_friction).zip(held).zip(&found.residual);
+    let legs = actuator.coulomb_friction_n.iter().zip(&actuator.load_friction_share).zip(held).zip(&found.residual_n);
     let rest = legs.map(|(((coulomb, load), held), residual)| {
         STICTION_RATIO * (coulomb + load * held.abs()) + RESIDUALS * residual
     });

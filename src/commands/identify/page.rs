@@ -115,7 +115,7 @@ fn dependence(machine: &Machine, runs: &[Run]) -> Vec<[Vec<[f64; 3]>; 2]> {
     let all: Vec<_> = runs.iter().flat_map(|run| predictions(machine, run)).collect();
     let bins = |leg: usize, of: fn(&[f64; 2]) -> f64| {
         let points =
-            || all.iter().filter(|each| each.leg == leg).map(|each| (of(&each.motion), each.residual));
+            || all.iter().filter(|each| each.leg == leg).map(|each| (of(&each.motion), each.residual_n));
         let (least, most) =
             points().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (x, _)| (a.min(x), b.max(x)));
         let width = (most - least) / BINS as f64;
@@ -153,10 +153,10 @@ impl Level {
         let mut columns = core::array::from_fn(|_| vec![f32::NAN; count]);
         for (before, after) in predictions(file, run).iter().zip(predictions(identified, run)) {
             let index = ((before.time_s - first_s) / step) as usize;
-            let forces = [before.command, before.command - before.residual, after.command - after.residual];
+            let forces = [before.command_n, before.command_n - before.residual_n, after.command_n - after.residual_n];
             let leg = before.leg;
             let of_leg = forces.into_iter().enumerate().map(|(k, force)| (3 * leg + k, force));
-            let residuals = [(3 * LEGS + leg, before.residual), (4 * LEGS + leg, after.residual)];
+            let residuals = [(3 * LEGS + leg, before.residual_n), (4 * LEGS + leg, after.residual_n)];
             for (column, number) in of_leg.chain(residuals) {
                 if let Some(place) =
                     columns.get_mut(column).and_then(|column: &mut Vec<f32>| column.get_mut(index))

@@ -19,36 +19,36 @@ const fn quantity(name: &'static str, unit: &'static str, value: fn(&Machine, &P
 
 /// Of the platform, the links and all drives.
 pub(super) const BODIES: [Quantity; 18] = [
-    quantity("platform.mass_kg", "kg", |machine, _| machine.platform.mass),
+    quantity("platform.mass_kg", "kg", |machine, _| machine.platform.mass_kg),
     quantity("platform with six rods", "kg", |machine, _| {
-        machine.platform.mass + LEGS as f64 * machine.rod.mass
+        machine.platform.mass_kg + LEGS as f64 * machine.rod.mass_kg
     }),
-    quantity("platform.center_of_mass_m[1]", "m", |machine, _| machine.platform.center_of_mass.x),
-    quantity("platform.center_of_mass_m[2]", "m", |machine, _| machine.platform.center_of_mass.y),
-    quantity("platform.center_of_mass_m[3]", "m", |machine, _| machine.platform.center_of_mass.z),
+    quantity("platform.center_of_mass_m[1]", "m", |machine, _| machine.platform.center_of_mass_m.x),
+    quantity("platform.center_of_mass_m[2]", "m", |machine, _| machine.platform.center_of_mass_m.y),
+    quantity("platform.center_of_mass_m[3]", "m", |machine, _| machine.platform.center_of_mass_m.z),
     quantity("platform.inertia_kg_m2.xx", "kg m^2", |machine, _| machine.platform.inertia.m11),
     quantity("platform.inertia_kg_m2.yy", "kg m^2", |machine, _| machine.platform.inertia.m22),
     quantity("platform.inertia_kg_m2.zz", "kg m^2", |machine, _| machine.platform.inertia.m33),
     quantity("platform.inertia_kg_m2.xy", "kg m^2", |machine, _| machine.platform.inertia.m12),
     quantity("platform.inertia_kg_m2.xz", "kg m^2", |machine, _| machine.platform.inertia.m13),
     quantity("platform.inertia_kg_m2.yz", "kg m^2", |machine, _| machine.platform.inertia.m23),
-    quantity("cylinder.center_of_mass_m", "m", |machine, _| machine.cylinder.center_of_mass),
-    quantity("cylinder.axial_inertia_kg_m2", "kg m^2", |machine, _| machine.cylinder.axial_inertia),
-    quantity("rod.mass_kg", "kg", |machine, _| machine.rod.mass),
-    quantity("rod.center_of_mass_m", "m", |machine, _| machine.rod.center_of_mass),
-    quantity("rod.axial_inertia_kg_m2", "kg m^2", |machine, _| machine.rod.axial_inertia),
+    quantity("cylinder.center_of_mass_m", "m", |machine, _| machine.cylinder.center_of_mass_m),
+    quantity("cylinder.axial_inertia_kg_m2", "kg m^2", |machine, _| machine.cylinder.axial_inertia_kg_m2),
+    quantity("rod.mass_kg", "kg", |machine, _| machine.rod.mass_kg),
+    quantity("rod.center_of_mass_m", "m", |machine, _| machine.rod.center_of_mass_m),
+    quantity("rod.axial_inertia_kg_m2", "kg m^2", |machine, _| machine.rod.axial_inertia_kg_m2),
     quantity("transverse inertia of both links", "kg m^2", |machine, _| {
-        machine.cylinder.transverse_inertia.constant + machine.rod.transverse_inertia.constant
+        machine.cylinder.transverse_inertia.constant_kg_m2 + machine.rod.transverse_inertia.constant_kg_m2
     }),
-    quantity("actuator.reflected_mass_kg", "kg", |machine, _| machine.actuator.reflected_mass),
+    quantity("actuator.reflected_mass_kg", "kg", |machine, _| machine.actuator.reflected_mass_kg),
 ];
 
 /// Of the payload.
 pub(super) const PAYLOAD: [Quantity; 4] = [
-    quantity("payload: mass", "kg", |_, payload| payload.mass),
-    quantity("payload: centre of mass x", "m", |_, payload| payload.center_of_mass.x),
-    quantity("payload: centre of mass y", "m", |_, payload| payload.center_of_mass.y),
-    quantity("payload: centre of mass z", "m", |_, payload| payload.center_of_mass.z),
+    quantity("payload: mass", "kg", |_, payload| payload.mass_kg),
+    quantity("payload: centre of mass x", "m", |_, payload| payload.center_of_mass_m.x),
+    quantity("payload: centre of mass y", "m", |_, payload| payload.center_of_mass_m.y),
+    quantity("payload: centre of mass z", "m", |_, payload| payload.center_of_mass_m.z),
 ];
 
 /// Names of the base parameters up to the reflected mass, by their index in the regressor.
@@ -96,8 +96,8 @@ pub(super) type LegQuantity = (&'static str, &'static str, fn(&Machine) -> &[f64
 
 /// Of each drive.
 pub(super) const LEG_QUANTITIES: [LegQuantity; 4] = [
-    ("actuator.viscous_friction_n_s_m", "N s/m", |machine| &machine.actuator.viscous_friction),
-    ("actuator.coulomb_friction_n", "N", |machine| &machine.actuator.coulomb_friction),
-    ("actuator.load_friction", "", |machine| &machine.actuator.load_friction),
+    ("actuator.viscous_friction_n_s_m", "N s/m", |machine| &machine.actuator.viscous_friction_n_s_m),
+    ("actuator.coulomb_friction_n", "N", |machine| &machine.actuator.coulomb_friction_n),
+    ("actuator.load_friction", "", |machine| &machine.actuator.load_friction_share),
     ("actuator.force_scale", "", |machine| &machine.actuator.force_scale),
 ];

@@ -90,7 +90,7 @@ impl StretchReader {
             return;
         }
         let RecordedStretch { sent, measured } = &mut self.current;
-        sent.push(SentForce { release_ns: input.release_ns, force: output.force });
+        sent.push(SentForce { release_ns: input.release_ns, force_n: output.command_n });
         let (Some(measurement), Some(platform), Some(reference)) =
             (input.measurement, output.platform, output.reference)
         else {
@@ -98,8 +98,8 @@ impl StretchReader {
         };
         let is_new = measured.last().is_none_or(|last| last.time_ns < measurement.time_ns);
         if is_new && !missed {
-            let (time_ns, length) = (measurement.time_ns, measurement.length);
-            measured.push(MeasuredMotion { time_ns, length, pose: platform.pose, reference });
+            let (time_ns, length) = (measurement.time_ns, measurement.length_m);
+            measured.push(MeasuredMotion { time_ns, length_m: length, pose: platform.pose, reference });
         }
     }
 

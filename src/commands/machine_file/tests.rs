@@ -114,9 +114,9 @@ fn a_configuration_has_the_new_values() {
     ];
     let config = Config::parse(&edited(TILTED, &values).unwrap(), "new").unwrap();
     let platform = &config.machine.platform;
-    assert_eq!((platform.mass, platform.inertia[(0, 1)]), (64.2345, -0.12345));
-    assert_eq!(platform.center_of_mass.as_slice(), [0.0211111, 0.015, 0.1234]);
-    assert_eq!(config.machine.actuator.coulomb_friction, friction);
+    assert_eq!((platform.mass_kg, platform.inertia[(0, 1)]), (64.2345, -0.12345));
+    assert_eq!(platform.center_of_mass_m.as_slice(), [0.0211111, 0.015, 0.1234]);
+    assert_eq!(config.machine.actuator.coulomb_friction_n, friction);
 }
 
 #[test]

@@ -121,7 +121,7 @@ impl Trajectory {
             [first, last],
             |refusal| {
                 // The setpoint belongs to the row after it, or to the last row.
-                let row = times.partition_point(|time| *time < refusal.t);
+                let row = times.partition_point(|time| *time < refusal.t_s);
                 let line = table.lines().get(row).or(table.lines().last());
                 if let Some(line) = line.filter(|line| reported != Some(**line)) {
                     errors.add(format!("line {line}: on the way to it, at {refusal}"));
@@ -142,7 +142,7 @@ impl Trajectory {
     pub fn from_rows(table: &NumberTable, path: &Path) -> Result<Self, TableError> {
         let mut errors = TableErrors::new(path);
         let knots: Vec<_> =
-            table.rows().iter().map(|row| Knot { t: time(row), state: task_state(row) }).collect();
+            table.rows().iter().map(|row| Knot { t_s: time(row), state: task_state(row) }).collect();
         let rows = || knots.iter().zip(table.lines());
         check_times(table, &mut errors);
         if let (Some(ratio), Some(line)) = (way_ratio(&knots), table.lines().get(1)) {
@@ -167,10 +167,10 @@ impl Trajectory {
     /// Duration \[s\].
     pub fn duration(&self) -> f64 {
         match self {
-            Self::BuiltIn(scene) => scene.duration,
+            Self::BuiltIn(scene) => scene.duration_s,
             Self::Excitation(excitation) => excitation.duration(),
             Self::Knots(knots) | Self::Tool(knots, ..) => {
-                knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t)
+                knots.last().map_or(0.0, |b| b.t_s) - knots.first().map_or(0.0, |a| a.t_s)
             }
         }
     }
@@ -192,7 +192,7 @@ impl Trajectory {
 
 /// The state `t` seconds after the first knot.
 fn at_knots(knots: &[Knot], t: f64) -> TaskState {
-    interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
+    interpolate(knots, knots.first().map_or(0.0, |first| first.t_s) + t).unwrap_or_default()
 }
 
 /// Largest share of a motion's amplitude, at most 1, with which the daemon accepts the whole motion with reserve.
@@ -222,7 +222,7 @@ fn accepted_share<M: Fn(f64) -> TaskState>(
 fn way_ratio(knots: &[Knot]) -> Option<f64> {
     let (mut by_rates, mut by_poses) = (0.0, 0.0);
     for (a, b) in knots.iter().zip(knots.iter().skip(1)) {
-        by_rates += 0.5 * (a.state.xd.norm() + b.state.xd.norm()) * (b.t - a.t);
+        by_rates += 0.5 * (a.state.xd.norm() + b.state.xd.norm()) * (b.t_s - a.t_s);
         by_poses += (b.state.x - a.state.x).norm();
     }
     let ratio = by_rates / by_poses;
@@ -265,9 +265,9 @@ mod tests {
                 text += &format!(
                     "{},0,0,0,{},0,0,0,0,0,{},0,0,0,0,0,{},0,0\n",
                     step * f64::from(k),
-                    profile.value,
-                    profile.rate,
-                    profile.accel
+                    profile.value_share,
+                    profile.rate_per_s,
+                    profile.accel_per_s2
                 );
             }
             text

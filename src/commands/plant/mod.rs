@@ -198,8 +198,8 @@ impl DrivenPlant {
             twist: state.twist.vector().into(),
             ..MeasuredMessage::from(&Measurement {
                 time_ns: self.time_ns,
-                length,
-                rate: Some(rate),
+                length_m: length,
+                rate_m_s: Some(rate),
                 drives: self.drive_status(),
                 ..Measurement::default()
             })
@@ -214,7 +214,7 @@ impl DrivenPlant {
             enabled: all_if(self.force.is_some()),
             brake_open: all_if(simulator.brakes() == Brakes::Open),
             fault: Some(0),
-            force: Some(simulator.forces()),
+            force_n: Some(simulator.forces()),
         }
     }
 }
@@ -226,10 +226,10 @@ fn log_terms(config: &Config, terms: &PlantTerms) {
         return;
     }
     let tolerance_um = plant.tolerance_m * 1e6;
-    info!(seed = plant.imperfections.seed, step_us = terms.step * 1e6, tolerance_um, "imperfect plant");
+    info!(seed = plant.imperfections.seed, step_us = terms.step_s * 1e6, tolerance_um, "imperfect plant");
     let wanted = &plant.imperfections;
     for (what, wanted, acts) in [
-        ("drive.bandwidth_hz", wanted.drive.bandwidth_hz.is_some(), terms.lag.is_some()),
+        ("drive.bandwidth_hz", wanted.drive.bandwidth_hz.is_some(), terms.lag_per_s.is_some()),
         ("leg", wanted.leg.is_some(), terms.elastic.is_some()),
     ] {
         if wanted && !acts {

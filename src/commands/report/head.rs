@@ -148,7 +148,7 @@ fn machine(config: &Config, coordinates: &Coordinates) -> MachineHead {
             joints.triples.unpack_vectors(lanes).map(in_frame)
         });
     let MotionDigits { mm, deg } = MotionDigits::new(config.resolution());
-    let gravity = frames.work.rotation.tr_mul(&machine.gravity).into();
+    let gravity = frames.work.rotation.tr_mul(&machine.gravity_m_s2).into();
     let home = coordinates.tool_x(&machine.home);
     MachineHead { base, platform, home, gravity, m_digits: mm + 3, deg_digits: deg }
 }

@@ -129,12 +129,12 @@ impl<'a> Signals<'a> {
 
         let legs = reference.map(|it| leg_motion(self.machine, &it));
         row.six(has_measurement.then_some(cycle.measured_length_m));
-        row.six(legs.as_ref().map(|it| it.length));
+        row.six(legs.as_ref().map(|it| it.length_m));
         row.six(Some(rates));
-        row.six(legs.as_ref().map(|it| it.rate));
+        row.six(legs.as_ref().map(|it| it.rate_m_s));
         row.six(Some(leg_accelerations));
-        row.six(between.map(|it| leg_motion(self.machine, &it).accel));
-        let applied = output.state.has_control().then_some(output.force);
+        row.six(between.map(|it| leg_motion(self.machine, &it).accel_m_s2));
+        let applied = output.state.has_control().then_some(output.command_n);
         let held = self.references.at(cycle.release_ns + force_ns);
         let computed = held.and_then(|it| self.model.forces::<Exact>(&it));
         row.six(applied);
@@ -248,10 +248,10 @@ mod tests {
             let time_ns = release_ns - AGE_NS;
             let Motion { pose, twist, .. } = motion(time_ns);
             let legs = leg_motion(&config.machine, &motion(time_ns));
-            let (length, rate) = (legs.length, Some(legs.rate));
-            let measurement = Some(Measurement { time_ns, length, rate, ..Measurement::default() });
+            let (length, rate) = (legs.length_m, Some(legs.rate_m_s));
+            let measurement = Some(Measurement { time_ns, length_m: length, rate_m_s: rate, ..Measurement::default() });
             let platform =
-                Some(PlatformState { pose, twist, condition: 1.0, time_to_singularity: f64::INFINITY });
+                Some(PlatformState { pose, twist, condition: 1.0, time_to_singularity_s: f64::INFINITY });
             let reference = Some(motion(release_ns + instants.reference_ns));
             let output = Output { platform, reference, ..Output::default() };
             let input = Input { release_ns, measurement, ..Input::default() };
@@ -288,7 +288,7 @@ mod tests {
             pose: config.machine.home_pose(),
             twist: Twist::default(),
             condition: 1.0,
-            time_to_singularity: f64::INFINITY,
+            time_to_singularity_s: f64::INFINITY,
         });
         let reference = Some(TaskState::at_rest(config.machine.home).motion());
         let output = Output { platform, reference, ..Output::default() };

@@ -132,7 +132,7 @@ fn cycle(
         pose: TaskState::at_rest(status.x).motion().pose,
         twist: Twist::from_vector(&status.twist.into()),
         condition: status.condition,
-        time_to_singularity: status.time_to_singularity_s,
+        time_to_singularity_s: status.time_to_singularity_s,
     });
     let error = (status.error_valid == 1).then(|| PoseError {
         pose: Twist { angular: status.orientation_error_rad.into(), linear: status.position_error_m.into() },
@@ -141,7 +141,7 @@ fn cycle(
     let output = Output {
         state,
         diagnostic: status.diagnostic.diagnostic().unwrap_or_default(),
-        force: force.force_n,
+        command_n: force.force_n,
         active_limits: LimitSet(status.active_limits),
         platform,
         error,

@@ -134,10 +134,10 @@ mod tests {
                 let quantity = Quantity { label: "", value, better, worst, max_force };
                 let quality = |condition| PoseQuality {
                     condition,
-                    stroke_margin: 1.0,
+                    stroke_margin_m: 1.0,
                     determinant: 1.0,
-                    worst_force: 1.0,
-                    payload: 1.0,
+                    worst_force_n: 1.0,
+                    payload_kg: 1.0,
                 };
                 distinct_texts(&quantity.thresholds([quality(low), quality(high)].iter()))
             });

@@ -31,11 +31,11 @@ impl MapDrawing<'_> {
         let max_force = self.machine.actuator.available_force();
         let reached = || slice.qualities.iter().filter(|quality| quality.within_reach());
         // If every pose needs more force than the actuators have, the map still shows how much.
-        let is_possible = reached().any(|quality| quality.worst_force <= max_force);
+        let is_possible = reached().any(|quality| quality.worst_force_n <= max_force);
         let (force_label, payload_label, max_force) = if is_possible {
             ("worst force [N]", "payload [kg]", max_force)
         } else {
-            let least = reached().map(|quality| quality.worst_force).fold(f64::INFINITY, f64::min);
+            let least = reached().map(|quality| quality.worst_force_n).fold(f64::INFINITY, f64::min);
             (
                 "worst force [N], nowhere within the limit",
                 "payload [kg]: none anywhere",
@@ -45,7 +45,7 @@ impl MapDrawing<'_> {
         [
             Quantity {
                 label: "stroke margin [m]",
-                value: |quality| quality.stroke_margin,
+                value: |quality| quality.stroke_margin_m,
                 better: Better::Higher,
                 worst: 0.0,
                 max_force: f64::INFINITY,
@@ -59,14 +59,14 @@ impl MapDrawing<'_> {
             },
             Quantity {
                 label: force_label,
-                value: |quality| quality.worst_force,
+                value: |quality| quality.worst_force_n,
                 better: Better::Lower,
                 worst: max_force,
                 max_force,
             },
             Quantity {
                 label: payload_label,
-                value: |quality| quality.payload,
+                value: |quality| quality.payload_kg,
                 better: Better::Higher,
                 // The payload is 0 for all poses beyond the limit, so only the forces show the edge.
                 worst: f64::MIN_POSITIVE,
@@ -88,10 +88,10 @@ impl MapDrawing<'_> {
 
     /// Lines for the limits of the reach and for the ball without obstacle.
     pub(super) fn lines(&self, slice: &Slice) -> Vec<MapLine> {
-        let edge = |quality: &PoseQuality| [quality.stroke_margin, quality.determinant];
+        let edge = |quality: &PoseQuality| [quality.stroke_margin_m, quality.determinant];
         let reach = outlines(slice.count, |places| slice.at(places).map(edge));
         let limit = |quality: &PoseQuality| {
-            [quality.stroke_margin, quality.determinant, self.largest_condition - quality.condition]
+            [quality.stroke_margin_m, quality.determinant, self.largest_condition - quality.condition]
         };
         let limited = outlines(slice.count, |places| slice.at(places).map(limit));
         let kinds = [
@@ -125,9 +125,9 @@ impl MapDrawing<'_> {
         let numbers = |quality: &PoseQuality| {
             let [margin, spare_force] = match threshold {
                 _ if threshold.is_nan() => [0.0; 2],
-                _ => [quantity.margin(quality, threshold), quantity.max_force - quality.worst_force],
+                _ => [quantity.margin(quality, threshold), quantity.max_force - quality.worst_force_n],
             };
-            [quality.stroke_margin, quality.determinant, margin, spare_force]
+            [quality.stroke_margin_m, quality.determinant, margin, spare_force]
         };
         let outlines = outlines(slice.count, |places| slice.at(places).map(numbers));
         let origin = outlines.first().and_then(|outline| outline.first()).copied();

@@ -139,8 +139,8 @@ impl WorkspaceReport {
         }
         let limits = &deployment.limits.reference;
         let effort = AccelerationDemand {
-            linear: query.acceleration_m_s2.unwrap_or(limits.position.acceleration),
-            angular: query.angular_acceleration_rad_s2.unwrap_or(limits.orientation.acceleration),
+            linear_m_s2: query.acceleration_m_s2.unwrap_or(limits.position.acceleration),
+            angular_rad_s2: query.angular_acceleration_rad_s2.unwrap_or(limits.orientation.acceleration),
         };
         let slices = slices(machine, &clearance, effort, query, through);
         let envelope = deployment.envelope.filter(has_extent);
@@ -153,8 +153,8 @@ impl WorkspaceReport {
         let report = Self {
             schema: SCHEMA,
             machine: name.clone(),
-            acceleration_m_s2: effort.linear,
-            angular_acceleration_rad_s2: effort.angular,
+            acceleration_m_s2: effort.linear_m_s2,
+            angular_acceleration_rad_s2: effort.angular_rad_s2,
             condition_limit: largest_condition,
             max_force_n: machine.actuator.available_force(),
             slices,
@@ -176,7 +176,7 @@ fn slices(
     through: [f64; 6],
 ) -> Vec<Slice> {
     let workspace = PoseEvaluator::new(machine, effort);
-    let default = Plane::default_three(&machine.gravity);
+    let default = Plane::default_three(&machine.gravity_m_s2);
     let planes = if query.planes.is_empty() { &default[..] } else { &query.planes };
     let bar = item_bar(planes.len() * query.resolution * query.resolution, "poses");
     let slice = |plane: &Plane| {
@@ -190,8 +190,8 @@ fn slices(
 
 fn regions(machine: &Machine, clearance: &Clearance, turn: f64, shape: &EnvelopeBounds) -> [RegionBounds; 3] {
     let shapes = [
-        RegionShape::Ball { turn: 0.0 },
-        RegionShape::Ball { turn },
+        RegionShape::Ball { turn_rad: 0.0 },
+        RegionShape::Ball { turn_rad: turn },
         RegionShape::Box { low: shape.pose_min, high: shape.pose_max },
     ];
     // Each ball takes two searches, the box one.

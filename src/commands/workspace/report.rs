@@ -98,7 +98,7 @@ impl SliceReport {
             let values = usable.iter().copied().map(value);
             values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(high, v)])
         };
-        let [_, largest_margin_m] = ends(|quality| quality.stroke_margin);
+        let [_, largest_margin_m] = ends(|quality| quality.stroke_margin_m);
         Self {
             plane: slice.plane.to_string(),
             poses: slice.qualities.len(),
@@ -108,8 +108,8 @@ impl SliceReport {
             ambiguous: slice.ambiguous().count(),
             largest_margin_m,
             condition: ends(|quality| quality.condition),
-            worst_force_n: ends(|quality| quality.worst_force),
-            payload_kg: ends(|quality| quality.payload),
+            worst_force_n: ends(|quality| quality.worst_force_n),
+            payload_kg: ends(|quality| quality.payload_kg),
         }
     }
 

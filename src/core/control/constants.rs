@@ -39,7 +39,7 @@ pub struct Constants {
     /// Kinematic state at home.
     pub home: KinematicState,
     /// Largest distance of a joint on the platform from C \[m\].
-    pub arm: f64,
+    pub arm_m: f64,
     /// Matrix from the acceleration that the law commands to the acceleration of the platform.
     pub acceleration_by_command: InputMatrix,
     /// Constants of the estimator under control.
@@ -59,7 +59,7 @@ pub struct Constants {
     /// error.
     pub max_reference_condition: f64,
     /// Least sine of the angle between a leg and the first axis of its universal joint, for the reference.
-    pub universal_sine: f64,
+    pub least_universal_sine: f64,
     /// Bounds on changes of the drives' forces.
     pub(super) force_changes: ForceChangeBounds,
 }
@@ -72,7 +72,7 @@ impl Constants {
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
         let NoiseModel { bandwidth_rad_s, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth_rad_s, period_s, rate_noise_ratio: None };
-        let Law { mode, leg_masses, max_compensated_disturbance, .. } = &parameters.law;
+        let Law { mode, leg_masses, max_compensated_acceleration: max_compensated_disturbance, .. } = &parameters.law;
         let acceleration_by_command = InputMatrix::at_home(machine, *mode, leg_masses, parameters.fidelity);
         let disturbance =
             acceleration_by_command.largest_compensable_disturbance(max_compensated_disturbance);
@@ -96,7 +96,7 @@ impl Constants {
             dynamics: InverseDynamics::new(machine),
             acceleration_by_command,
             least_missing_acceleration_squared,
-            frozen_leg: FrozenLegBounds::new(parameters.law.position.stiffness, &machine.actuator, period_s),
+            frozen_leg: FrozenLegBounds::new(parameters.law.position.kp_per_s2, &machine.actuator, period_s),
             estimator: EstimatorConstants::new(
                 parameters.noise,
                 parameters.reading_errors,
@@ -111,9 +111,9 @@ impl Constants {
                 f64::INFINITY,
             ),
             parameters,
-            arm,
-            max_reference_condition: max_reference_condition(&home, parameters.condition),
-            universal_sine: least_universal_sine(machine, &home),
+            arm_m: arm,
+            max_reference_condition: max_reference_condition(&home, parameters.max_condition),
+            least_universal_sine: least_universal_sine(machine, &home),
             force_changes: ForceChangeBounds::new(machine),
             home,
         }
@@ -122,7 +122,7 @@ impl Constants {
     /// Length that converts angles of the error to distances \[m\]; 1 for errors of legs, which have no
     /// angles.
     pub(super) fn angle_weighting_radius_m(&self) -> f64 {
-        if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
+        if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm_m }
     }
 
     /// The machine.

@@ -46,7 +46,7 @@ pub struct Output {
     /// Why that request was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
     /// Forces \[N\]; zero unless the state has control.
-    pub force: [f64; LEGS],
+    pub command_n: [f64; LEGS],
     /// Wrench of the forces minus the wrench of the commanded forces, about C; zero unless forces are
     /// limited.
     pub wrench_error: Wrench,
@@ -202,7 +202,7 @@ impl Controller {
                 supervisor.fail(diagnostic);
             }
         }
-        drives.record_sent(&limited.command);
+        drives.record_sent(&limited.command_n);
 
         let mut output = Output::new(supervisor, &limited, error);
         output.active_limits = active_limits.union(reference.active_limits()).union(limited.active_limits);
@@ -219,13 +219,13 @@ impl Output {
     /// Output of a state, without the motions of platform and reference, and without counts.
     #[inline(always)]
     fn new(supervisor: &Supervisor, limited: &LimitedForces, error: Option<PoseError>) -> Self {
-        let LimitedForces { command: force, wrench_error, active_limits } = *limited;
+        let LimitedForces { command_n: force, wrench_error, active_limits } = *limited;
         Self {
             state: supervisor.current.state,
             diagnostic: supervisor.current.diagnostic,
             answered_message: supervisor.answered_message,
             request_diagnostic: supervisor.request_diagnostic,
-            force,
+            command_n: force,
             wrench_error,
             active_limits,
             missed_measurements: 0,

@@ -36,9 +36,9 @@ pub struct Parameters {
     /// Range of the setpoints; `None` means no bounds.
     pub envelope: Option<Envelope>,
     /// Largest condition of the pose, see [`crate::model::sensitivity`].
-    pub condition: f64,
+    pub max_condition: f64,
     /// Largest change of a force \[N/s\].
-    pub force_rate: f64,
+    pub force_rate_n_s: f64,
     /// Reaction to a setpoint that the limits do not allow to follow.
     pub on_violation: ViolationPolicy,
     /// Whether control may begin beyond the engage tolerance of a setpoint in motion.
@@ -51,25 +51,25 @@ pub struct Parameters {
     pub payload_change_kg: Option<f64>,
     /// Sudden disturbance that is no impact \[m/s^2\]; `None` means the default, which follows from the
     /// acceleration limit.
-    pub disturbance_step: Option<f64>,
+    pub disturbance_step_m_s2: Option<f64>,
     /// Distance that the reference keeps from the ends of the stroke \[m\].
-    pub stroke_margin: f64,
+    pub stroke_margin_m: f64,
     /// Largest velocity error under control \[m/s\].
-    pub following_velocity: f64,
+    pub following_velocity_m_s: f64,
     /// Largest angular velocity error under control \[rad/s\].
-    pub following_angular_velocity: f64,
+    pub following_angular_velocity_rad_s: f64,
     /// Goal of the stop of a platform that lost its setpoint.
     pub after_loss: AfterStop,
     /// Time for which a platform without setpoints holds its pose before it parks or stops, if that is the goal \[ns\].
     pub lost_hold_ns: u64,
     /// Largest position error at which control may begin \[m\].
-    pub engage_position: f64,
+    pub engage_position_m: f64,
     /// Largest orientation error at which control may begin \[rad\].
-    pub engage_orientation: f64,
+    pub engage_orientation_rad: f64,
     /// Largest position error under control \[m\].
-    pub following_position: f64,
+    pub following_position_m: f64,
     /// Largest orientation error under control \[rad\].
-    pub following_orientation: f64,
+    pub following_orientation_rad: f64,
     /// Age from which on a setpoint counts as lost \[ns\].
     pub setpoint_timeout_ns: u64,
     /// Age from which on a measurement counts as lost \[ns\].
@@ -77,7 +77,7 @@ pub struct Parameters {
     /// Longest wait for drives that are not ready when control begins \[ns\].
     pub ready_timeout_ns: u64,
     /// Largest difference between a measured length and the length at the pose of another sensor \[m\].
-    pub pose_tolerance: f64,
+    pub pose_tolerance_m: f64,
     /// Largest age of a measurement on arrival \[ns\]: the loop is stable if all measurements are as old.
     pub max_age_at_arrival_ns: u64,
     /// Longest time between two cycles of a running daemon, also without messages \[ns\].
@@ -99,13 +99,13 @@ impl Parameters {
     /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided
     /// by `wn = sqrt(Kp)`, so that it compares with a pose error.
     pub fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
-        let Self { law, engage_position, engage_orientation, .. } = self;
+        let Self { law, engage_position_m: engage_position, engage_orientation_rad: engage_orientation, .. } = self;
         let PoseError { pose, twist } = error;
         largest_ratio([
             pose.linear.norm() / engage_position,
             pose.angular.norm() / engage_orientation,
-            twist.linear.norm() / (law.position.stiffness.sqrt() * engage_position),
-            twist.angular.norm() / (law.orientation.stiffness.sqrt() * engage_orientation),
+            twist.linear.norm() / (law.position.kp_per_s2.sqrt() * engage_position),
+            twist.angular.norm() / (law.orientation.kp_per_s2.sqrt() * engage_orientation),
         ])
     }
 

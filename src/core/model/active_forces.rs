@@ -61,13 +61,13 @@ pub struct TaskLoad {
     /// W without the axial forces; torque about C \[N m\], then force \[N\].
     pub wrench: Vector6<f64>,
     /// Load along each leg, drive included \[N\].
-    pub axial_forces: Vector6<f64>,
+    pub axial_forces_n: Vector6<f64>,
 }
 
 impl TaskLoad {
     /// Whole load as a wrench about C \[N m\], \[N\]: `W + N axial_forces`.
     pub fn total(&self) -> Vector6<f64> {
-        self.wrench + self.leg_wrenches * self.axial_forces
+        self.wrench + self.leg_wrenches * self.axial_forces_n
     }
 }
 
@@ -76,12 +76,12 @@ impl InverseDynamics {
     pub fn new(machine: &Machine) -> Self {
         let (actuator, triples) = (&machine.actuator, &machine.joints.triples);
         Self {
-            joints: machine.joints.with_point(&machine.platform.center_of_mass),
+            joints: machine.joints.with_point(&machine.platform.center_of_mass_m),
             legs: LegConstants::new(machine),
             axes: PrincipalAxes::new(machine),
-            viscous_friction: triples.pack(&actuator.viscous_friction),
-            coulomb_friction: triples.pack(&actuator.coulomb_friction),
-            inverse_smoothing: 1.0 / actuator.coulomb_smoothing,
+            viscous_friction: triples.pack(&actuator.viscous_friction_n_s_m),
+            coulomb_friction: triples.pack(&actuator.coulomb_friction_n),
+            inverse_smoothing: 1.0 / actuator.coulomb_smoothing_m_s,
             machine: machine.clone(),
         }
     }
@@ -126,7 +126,7 @@ impl InverseDynamics {
             TaskLoad {
                 leg_wrenches: wrench_columns(triples, &legs),
                 wrench: wrench.sum().vector(),
-                axial_forces: triples.unpack(&axial.into()).into(),
+                axial_forces_n: triples.unpack(&axial.into()).into(),
             }
         })
     }
@@ -154,7 +154,7 @@ impl InverseDynamics {
             force: reaction.transverse.folded(),
         };
         if !M::ACCELERATION {
-            return (wrench, reaction.axial);
+            return (wrench, reaction.axial_n);
         }
         wrench.torque = wrench.torque + self.axes.torques(simd, &motion.pose.rotation, &map);
         let mut accel = legs.direction.dot(joint_acceleration);
@@ -162,14 +162,14 @@ impl InverseDynamics {
             accel = legs.accel(&velocity, joint_acceleration);
         }
         let friction = [self.viscous_friction, self.coulomb_friction].map(|lanes| lanes.load(simd));
-        (wrench, reaction.axial + self.drive_force(simd, friction, velocity.rate, accel))
+        (wrench, reaction.axial_n + self.drive_force(simd, friction, velocity.rate_m_s, accel))
     }
 
     /// Forces of the platform and the drives on each leg, per unit of the acceleration of its joint along x, y
     /// and z, from rest.
     #[inline(always)]
     pub(super) fn joint_masses<S: Simd>(&self, simd: S, legs: &LegGeometry<S>) -> [JointForces<S>; 3] {
-        let reflected = legs.direction * f64x8::splat(simd, self.machine.actuator.reflected_mass);
+        let reflected = legs.direction * f64x8::splat(simd, self.machine.actuator.reflected_mass_kg);
         let [mut x, mut y, mut z] = self.legs.joint_masses(simd, &self.machine, legs);
         x.axial += reflected.x;
         y.axial += reflected.y;
@@ -206,7 +206,7 @@ impl InverseDynamics {
         let one = splat(1.0);
         let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
         let friction = viscous.fused_mul_add(rate, coulomb * sign);
-        splat(self.machine.actuator.reflected_mass).fused_mul_add(accel, friction)
+        splat(self.machine.actuator.reflected_mass_kg).fused_mul_add(accel, friction)
     }
 }
 

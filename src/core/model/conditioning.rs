@@ -16,9 +16,9 @@ pub struct Conditioning {
     /// Condition and norm of N.
     pub sensitivity: Sensitivity,
     /// Largest norm of a row of `N^-1`, as in the sensitivity.
-    pub largest_row: f64,
+    pub largest_row_norm: f64,
     /// Length of the shortest leg \[m\].
-    pub shortest: f64,
+    pub shortest_leg_m: f64,
     /// See [`super::inverse_geometry::universal_sine`].
     pub universal_sine: f64,
     /// Whether the blocks of the factorization are too close to singular, so that LU with pivoting replaced
@@ -36,9 +36,9 @@ impl Conditioning {
             let (sensitivity, largest_row) =
                 Sensitivity::with_largest_row(simd, joints, &legs, &factorization);
             Self {
-                largest_row,
+                largest_row_norm: largest_row,
                 sensitivity,
-                shortest: least_of_legs(legs.length),
+                shortest_leg_m: least_of_legs(legs.length_m),
                 universal_sine: legs.universal_sine(simd, joints),
                 is_pivoted: !factorization.uses_blocks,
             }

@@ -65,7 +65,7 @@ impl DriveLoads {
         let holding = factorization.forces(legs, &wrench, axial)?.load(simd) * of_legs;
         let [x, y, z] = dynamics.joint_masses(simd, legs);
         let [mx, my, mz] = [&x, &y, &z].map(|column| column.transverse);
-        let arm = legs.arm + Lanes3::splat(simd, &(pose.rotation * dynamics.joints().center));
+        let arm = legs.arm + Lanes3::splat(simd, &(pose.rotation * dynamics.joints().center_m));
         let zero = Lanes3::splat(simd, &Vector3::zeros());
         let [tx, ty, tz] = dynamics.axes().inertia(simd, &pose.rotation);
         let turning = [tx, ty, tz, zero, zero, zero];

@@ -105,7 +105,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         let inverse_d_s = one / d_s;
 
         let ([d_a, ..], [d_s, ..]) = (d_a.legs(), d_s.legs());
-        let uses_blocks = are_regular_blocks(d_a, d_s, joints.radius_cubed);
+        let uses_blocks = are_regular_blocks(d_a, d_s, joints.radius_cubed_m3);
         let determinants = [d_a, d_s];
         Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, uses_blocks }
     }

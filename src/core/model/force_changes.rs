@@ -29,20 +29,20 @@ pub struct ForceBound {
     /// Norm of the wrench.
     pub wrench: f64,
     /// Largest along a leg.
-    pub axial: f64,
+    pub axial_n: f64,
 }
 
 /// Largest accelerations and velocities of the platform.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LargestMotion {
     /// Angular acceleration \[rad/s^2\].
-    pub angular: f64,
+    pub angular_rad_s2: f64,
     /// Acceleration of C \[m/s^2\].
-    pub linear: f64,
+    pub linear_m_s2: f64,
     /// Angular velocity \[rad/s\].
-    pub angular_velocity: f64,
+    pub angular_velocity_rad_s: f64,
     /// Velocity of C \[m/s\].
-    pub velocity: f64,
+    pub velocity_m_s: f64,
 }
 
 /// Factors of the bounds on changes of the forces, constant for a machine.
@@ -62,22 +62,22 @@ pub struct ForceChangeBounds {
     viscous_friction: f64,
     coulomb_friction: f64,
     /// Largest rate of a leg \[m/s\].
-    pub max_rate: f64,
+    pub max_rate_m_s: f64,
     /// Largest distance of a joint from C \[m\].
-    pub arm: f64,
+    pub arm_m: f64,
 }
 
 impl ForceChangeBounds {
     /// Factors of a machine.
     pub fn new(machine: &Machine) -> Self {
         let (platform, actuator, joints) = (&machine.platform, &machine.actuator, &machine.joints);
-        let (g, r) = (machine.gravity.norm(), joints.radius);
+        let (g, r) = (machine.gravity_m_s2.norm(), joints.radius_m);
         let arms = joints.triples.unpack_vectors(&joints.platform);
         let center = arms.iter().sum::<Vector3<f64>>() / LEGS as f64;
         let arm = arms.iter().map(Vector3::norm).fold(0.0, f64::max);
-        let (mass, inertia) = (platform.mass, platform.inertia.norm());
-        let com = platform.center_of_mass.norm();
-        let com_arm = (platform.center_of_mass - center).norm() / r;
+        let (mass, inertia) = (platform.mass_kg, platform.inertia.norm());
+        let com = platform.center_of_mass_m.norm();
+        let com_arm = (platform.center_of_mass_m - center).norm() / r;
         let com_wrench = (1.0 + com_arm * com_arm).sqrt();
         let legs = LegMasses::largest(machine);
         // Sums over the legs: of the arms, and of the wrenches of unit forces at the joints.
@@ -87,8 +87,8 @@ impl ForceChangeBounds {
             arm_sum += arm;
             wrench_sum += (1.0 + arm * arm).sqrt();
         }
-        let axial_mass = actuator.reflected_mass + machine.rod.mass;
-        let length = actuator.min_length;
+        let axial_mass = actuator.reflected_mass_kg + machine.rod.mass_kg;
+        let length = actuator.min_length_m;
         Self {
             whole: [
                 (mass * com_wrench + wrench_sum * legs.weight) * g,
@@ -113,16 +113,16 @@ impl ForceChangeBounds {
                 ],
                 [
                     axial_mass * arm,
-                    actuator.reflected_mass / length
-                        + machine.rod.mass * machine.rod.center_of_mass / (length * length),
+                    actuator.reflected_mass_kg / length
+                        + machine.rod.mass_kg * machine.rod.center_of_mass_m / (length * length),
                 ],
             ],
             axial_mass,
-            axial_weight: machine.rod.mass * g,
+            axial_weight: machine.rod.mass_kg * g,
             viscous_friction: actuator.largest_viscous_friction(),
             coulomb_friction: actuator.largest_coulomb_friction(),
-            max_rate: actuator.max_rate,
-            arm,
+            max_rate_m_s: actuator.max_rate_m_s,
+            arm_m: arm,
         }
     }
 
@@ -131,16 +131,16 @@ impl ForceChangeBounds {
         let ([turned, ..], [leg, _]) = (self.by_turn, self.by_turned_leg);
         ForceBound {
             wrench: turned * turn + leg * turned_leg,
-            axial: self.axial_weight * turned_leg + self.coulomb_friction,
+            axial_n: self.axial_weight * turned_leg + self.coulomb_friction,
         }
     }
 
     /// Changes of the forces under accelerations, and forces of velocities.
     pub fn moving(&self, motion: &LargestMotion, turn: f64, turned_leg: f64) -> ForceBound {
-        let LargestMotion { angular, linear, angular_velocity, velocity } = *motion;
+        let LargestMotion { angular_rad_s2: angular, linear_m_s2: linear, angular_velocity_rad_s: angular_velocity, velocity_m_s: velocity } = *motion;
         let turning = angular_velocity * angular_velocity;
-        let joint_acceleration = linear + self.arm * angular;
-        let joint_speed = velocity + self.arm * angular_velocity;
+        let joint_acceleration = linear + self.arm_m * angular;
+        let joint_speed = velocity + self.arm_m * angular_velocity;
         let joint = joint_speed * joint_speed;
         let ([_, by_linear, by_angular], [_, by_joint]) = (self.by_turn, self.by_turned_leg);
         let [[wrench, joint_wrench], [axial, joint_axial]] = self.by_velocity;
@@ -149,29 +149,29 @@ impl ForceChangeBounds {
                 + by_joint * joint_acceleration * turned_leg
                 + wrench * turning
                 + joint_wrench * joint,
-            axial: self.axial_mass * (joint_acceleration * turned_leg + self.arm * angular * turn)
+            axial_n: self.axial_mass * (joint_acceleration * turned_leg + self.arm_m * angular * turn)
                 + axial * turning
                 + joint_axial * joint
-                + self.viscous_friction * joint_speed.min(self.max_rate),
+                + self.viscous_friction * joint_speed.min(self.max_rate_m_s),
         }
     }
 
     /// Forces at any pose.
     pub fn whole(&self, motion: &LargestMotion) -> ForceBound {
         let ([weight, by_linear, by_angular], of_velocity) = (self.whole, self.moving(motion, 0.0, 0.0));
-        let joint_acceleration = motion.linear + self.arm * motion.angular;
+        let joint_acceleration = motion.linear_m_s2 + self.arm_m * motion.angular_rad_s2;
         ForceBound {
-            wrench: weight + by_linear * motion.linear + by_angular * motion.angular + of_velocity.wrench,
-            axial: self.axial_mass * joint_acceleration
+            wrench: weight + by_linear * motion.linear_m_s2 + by_angular * motion.angular_rad_s2 + of_velocity.wrench,
+            axial_n: self.axial_mass * joint_acceleration
                 + self.axial_weight
                 + self.coulomb_friction
-                + of_velocity.axial,
+                + of_velocity.axial_n,
         }
     }
 
     /// Bound on the norm of the six forces along the legs.
     pub fn axial_norm(&self, motion: &LargestMotion) -> f64 {
-        SQRT_LEGS * (self.axial_mass * (motion.linear + self.arm * motion.angular) + self.axial_weight)
+        SQRT_LEGS * (self.axial_mass * (motion.linear_m_s2 + self.arm_m * motion.angular_rad_s2) + self.axial_weight)
     }
 }
 
@@ -195,11 +195,11 @@ impl LegMasses {
     fn largest(machine: &Machine) -> Self {
         let actuator = &machine.actuator;
         let step = actuator.stroke() / f64::from(LENGTHS);
-        let at = |k: u32| Self::at(machine, actuator.min_length + step * f64::from(k));
+        let at = |k: u32| Self::at(machine, actuator.min_length_m + step * f64::from(k));
         let mut largest = at(0);
         for k in 1..=LENGTHS {
             let (before, now) = (at(k - 1), at(k));
-            let per_length = actuator.max_length / step;
+            let per_length = actuator.max_length_m / step;
             largest = Self {
                 inertia: largest.inertia.max(now.inertia),
                 inertia_change: largest.inertia_change.max((now.inertia - before.inertia).abs() * per_length),
@@ -214,9 +214,9 @@ impl LegMasses {
     /// j, mu and `|m2 r / L - j|` of [`crate::model::leg`].
     fn at(machine: &Machine, length: f64) -> Self {
         let (cylinder, rod) = (&machine.cylinder, &machine.rod);
-        let r = length - rod.center_of_mass;
+        let r = length - rod.center_of_mass_m;
         let transverse = |link: &Link| link.transverse_inertia.at(length);
-        let (e1, m1, m2) = (cylinder.center_of_mass, cylinder.mass, rod.mass);
+        let (e1, m1, m2) = (cylinder.center_of_mass_m, cylinder.mass_kg, rod.mass_kg);
         let inertia =
             (m1 * e1 * e1 + m2 * r * r + transverse(cylinder) + transverse(rod)) / (length * length);
         Self {

@@ -31,16 +31,16 @@ pub(super) struct LegGeometry<S: Simd> {
     /// n, unit vector from base to platform.
     pub direction: Lanes3<f64x8<S>>,
     /// L
-    pub length: f64x8<S>,
+    pub length_m: f64x8<S>,
     /// 1 / L
-    pub inverse_length: f64x8<S>,
+    pub inverse_length_per_m: f64x8<S>,
 }
 
 /// First time derivatives of length and direction, in lanes.
 #[derive(Clone, Copy)]
 pub(super) struct LegVelocity<S: Simd> {
     /// L'
-    pub rate: f64x8<S>,
+    pub rate_m_s: f64x8<S>,
     /// n'
     pub direction: Lanes3<f64x8<S>>,
 }
@@ -55,7 +55,7 @@ impl<S: Simd> LegGeometry<S> {
     /// Geometry with arms from the mean of the joints on the platform, independent of C.
     #[inline(always)]
     pub fn around_center(simd: S, joints: &Joints, pose: &Pose) -> Self {
-        let position = pose.position + pose.rotation * joints.center;
+        let position = pose.position + pose.rotation * joints.center_m;
         Self::of(simd, &joints.around_center, joints, &Pose { rotation: pose.rotation, position })
     }
 
@@ -76,7 +76,7 @@ impl<S: Simd> LegGeometry<S> {
         let s = position + arm - base;
         let length = s.dot(s).sqrt();
         let inverse_length = f64x8::splat(simd, 1.0) / length;
-        Self { arm, direction: s * inverse_length, length, inverse_length }
+        Self { arm, direction: s * inverse_length, length_m: length, inverse_length_per_m: inverse_length }
     }
 
     /// Smallest sine of a leg's angle to its universal joint, see [`universal_sine`].
@@ -97,8 +97,8 @@ impl<S: Simd> LegGeometry<S> {
     pub fn velocity_in_lanes(&self, angular: Lanes3<f64x8<S>>, linear: Lanes3<f64x8<S>>) -> LegVelocity<S> {
         let joint = linear + angular.cross(self.arm);
         let rate = self.direction.dot(joint);
-        let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length;
-        LegVelocity { rate, direction }
+        let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length_per_m;
+        LegVelocity { rate_m_s: rate, direction }
     }
 
     /// Joint accelerations aB, with `acceleration_map` from [`super::platform::acceleration_map`].
@@ -116,7 +116,7 @@ impl<S: Simd> LegGeometry<S> {
     #[inline(always)]
     pub fn accel(&self, velocity: &LegVelocity<S>, joint_acceleration: Lanes3<f64x8<S>>) -> f64x8<S> {
         let turn = velocity.direction;
-        self.length.fused_mul_add(turn.dot(turn), self.direction.dot(joint_acceleration))
+        self.length_m.fused_mul_add(turn.dot(turn), self.direction.dot(joint_acceleration))
     }
 }
 
@@ -124,11 +124,11 @@ impl<S: Simd> LegGeometry<S> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LegMotion {
     /// L \[m\]
-    pub length: [f64; LEGS],
+    pub length_m: [f64; LEGS],
     /// L' \[m/s\]
-    pub rate: [f64; LEGS],
+    pub rate_m_s: [f64; LEGS],
     /// L'' \[m/s^2\]
-    pub accel: [f64; LEGS],
+    pub accel_m_s2: [f64; LEGS],
 }
 
 /// Lengths, rates and accelerations of the six legs for a motion of the platform.
@@ -149,9 +149,9 @@ pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
         let map = acceleration_map(&motion.twist, &motion.acceleration);
         let accel = legs.accel(&velocity, legs.joint_acceleration(simd, &motion.acceleration, &map));
         LegMotion {
-            length: unpack(legs.length.into()),
-            rate: unpack(velocity.rate.into()),
-            accel: unpack(accel.into()),
+            length_m: unpack(legs.length_m.into()),
+            rate_m_s: unpack(velocity.rate_m_s.into()),
+            accel_m_s2: unpack(accel.into()),
         }
     })
 }
@@ -160,7 +160,7 @@ pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
 pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::new(simd, &machine.joints, pose);
-        machine.joints.triples.unpack(&legs.length.into())
+        machine.joints.triples.unpack(&legs.length_m.into())
     })
 }
 
@@ -170,7 +170,7 @@ pub fn leg_lengths_and_rates(machine: &Machine, pose: &Pose, twist: &Twist) -> (
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::new(simd, &machine.joints, pose);
         let velocity = legs.velocity(simd, twist);
-        (unpack(legs.length.into()), unpack(velocity.rate.into()))
+        (unpack(legs.length_m.into()), unpack(velocity.rate_m_s.into()))
     })
 }
 
@@ -184,7 +184,7 @@ pub fn length_and_rate_lanes<S: Simd>(
     twist: &Twist,
 ) -> (f64x8<S>, f64x8<S>) {
     let legs = LegGeometry::new(simd, &machine.joints, pose);
-    (legs.length, legs.velocity(simd, twist).rate)
+    (legs.length_m, legs.velocity(simd, twist).rate_m_s)
 }
 
 /// Directions `n_i` of the six legs at a pose: unit vectors from base to platform, base axes.

@@ -46,7 +46,7 @@ pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
         let legs = LegGeometry::around_center(simd, &machine.joints, pose);
         wrench_columns(&machine.joints.triples, &legs)
     });
-    scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius);
+    scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius_m);
     scaled
 }
 

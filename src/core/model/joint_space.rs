@@ -53,7 +53,7 @@ pub struct LegDynamics {
     /// C + G \[N m, N m, N\].
     pub bias: Vector3<f64>,
     /// phi, force of the leg on the platform at B, base axes \[N\].
-    pub contact_force: Vector3<f64>,
+    pub contact_force_n: Vector3<f64>,
 }
 
 /// Dynamics of the six legs for a motion and its actuator forces Gamma \[N\].
@@ -61,7 +61,7 @@ pub fn joint_space(machine: &Machine, motion: &Motion, forces: &[f64; LEGS]) -> 
     let joints = &machine.joints;
     let [bases, platforms, axes] = [&joints.base, &joints.platform, &joints.universal_axis]
         .map(|lanes| joints.triples.unpack_vectors(lanes));
-    let friction = machine.actuator.viscous_friction.iter().zip(&machine.actuator.coulomb_friction);
+    let friction = machine.actuator.viscous_friction_n_s_m.iter().zip(&machine.actuator.coulomb_friction_n);
     let mut legs = [LegDynamics::default(); LEGS];
     let places = bases.iter().zip(&platforms).zip(&axes);
     for ((leg, ((base, platform), u)), (force, friction)) in
@@ -102,15 +102,15 @@ impl LegDynamics {
         );
 
         let (cylinder, rod, actuator) = (&machine.cylinder, &machine.rod, &machine.actuator);
-        let (m2, r) = (rod.mass, length - rod.center_of_mass);
-        let moment = cylinder.mass * cylinder.center_of_mass + m2 * r;
-        let axial = cylinder.axial_inertia + rod.axial_inertia;
-        let transverse = cylinder.mass * cylinder.center_of_mass * cylinder.center_of_mass
+        let (m2, r) = (rod.mass_kg, length - rod.center_of_mass_m);
+        let moment = cylinder.mass_kg * cylinder.center_of_mass_m + m2 * r;
+        let axial = cylinder.axial_inertia_kg_m2 + rod.axial_inertia_kg_m2;
+        let transverse = cylinder.mass_kg * cylinder.center_of_mass_m * cylinder.center_of_mass_m
             + m2 * r * r
             + cylinder.transverse_inertia.at(length)
             + rod.transverse_inertia.at(length);
         let mass = Vector3::new(axial * s * s + transverse * c * c, transverse, m2);
-        let (g, turn) = (axes.tr_mul(&machine.gravity), (axial - transverse) * s * c);
+        let (g, turn) = (axes.tr_mul(&machine.gravity_m_s2), (axial - transverse) * s * c);
         let bias = Vector3::new(
             2.0 * (m2 * r * c * c * rate.z + turn * rate.y) * rate.x + moment * c * g.z,
             2.0 * m2 * r * rate.z * rate.y - turn * rate.x * rate.x - moment * g.y,
@@ -119,7 +119,7 @@ impl LegDynamics {
 
         let d = mass.component_mul(&accel) + bias;
         let end_load = Vector3::new(d.z, d.y / length, -d.x / (length * c));
-        let drive = actuator.reflected_mass * accel.z + viscous * rate.z + coulomb * actuator.sign(rate.z);
-        Self { accel, mass, bias, contact_force: n * (force - drive) - axes * end_load }
+        let drive = actuator.reflected_mass_kg * accel.z + viscous * rate.z + coulomb * actuator.sign(rate.z);
+        Self { accel, mass, bias, contact_force_n: n * (force - drive) - axes * end_load }
     }
 }

@@ -49,8 +49,8 @@ impl StoredLegs {
         Self {
             arm: legs.arm.store(),
             direction: legs.direction.store(),
-            length: legs.length.into(),
-            inverse_length: legs.inverse_length.into(),
+            length: legs.length_m.into(),
+            inverse_length: legs.inverse_length_per_m.into(),
         }
     }
 
@@ -59,8 +59,8 @@ impl StoredLegs {
         LegGeometry {
             arm: Lanes3::load(simd, &self.arm),
             direction: Lanes3::load(simd, &self.direction),
-            length: self.length.load(simd),
-            inverse_length: self.inverse_length.load(simd),
+            length_m: self.length.load(simd),
+            inverse_length_per_m: self.inverse_length.load(simd),
         }
     }
 }

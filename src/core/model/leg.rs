@@ -75,31 +75,31 @@ pub(super) struct LegConstants {
 impl LegConstants {
     pub fn new(machine: &Machine) -> Self {
         let (cylinder, rod) = (&machine.cylinder, &machine.rod);
-        let (m1, e1, m2, e2) = (cylinder.mass, cylinder.center_of_mass, rod.mass, rod.center_of_mass);
+        let (m1, e1, m2, e2) = (cylinder.mass_kg, cylinder.center_of_mass_m, rod.mass_kg, rod.center_of_mass_m);
         let (it1, it2) = (&cylinder.transverse_inertia, &rod.transverse_inertia);
         let legs = Triples::uniform;
-        let linear = m2 * e2 + it1.quadratic * it1.reference_length + it2.quadratic * it2.reference_length;
+        let linear = m2 * e2 + it1.quadratic_kg * it1.reference_length_m + it2.quadratic_kg * it2.reference_length_m;
         let constant = m1 * e1 * e1
             + m2 * e2 * e2
-            + it1.constant
-            + it2.constant
-            + it1.quadratic * it1.reference_length * it1.reference_length
-            + it2.quadratic * it2.reference_length * it2.reference_length;
-        let mass = machine.platform.mass;
+            + it1.constant_kg_m2
+            + it2.constant_kg_m2
+            + it1.quadratic_kg * it1.reference_length_m * it1.reference_length_m
+            + it2.quadratic_kg * it2.reference_length_m * it2.reference_length_m;
+        let mass = machine.platform.mass_kg;
         Self {
             jt: [
-                legs(m2 + it1.quadratic + it2.quadratic, mass),
+                legs(m2 + it1.quadratic_kg + it2.quadratic_kg, mass),
                 legs(-2.0 * linear, 0.0),
                 legs(constant, 0.0),
             ],
             rod_mass: legs(m2, mass),
             first_moment: legs(m1 * e1 - m2 * e2, 0.0),
             rod_moment: legs(m2 * e2, 0.0),
-            axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
+            axial_inertia: legs(cylinder.axial_inertia_kg_m2 + rod.axial_inertia_kg_m2, 0.0),
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
-            gravity: machine.gravity,
+            gravity: machine.gravity_m_s2,
         }
     }
 
@@ -125,7 +125,7 @@ impl LegConstants {
 fn lumped_mass(machine: &Machine) -> f64 {
     let (cylinder, rod) = (&machine.cylinder, &machine.rod);
     let length = leg_lengths(machine, &machine.home_pose()).iter().sum::<f64>() / LEGS as f64;
-    (cylinder.mass * cylinder.center_of_mass + rod.mass * (length - rod.center_of_mass)) / length
+    (cylinder.mass_kg * cylinder.center_of_mass_m + rod.mass_kg * (length - rod.center_of_mass_m)) / length
 }
 
 /// Force F of the platform on each leg \[N\], base axes, split in two parts.
@@ -133,7 +133,7 @@ pub(super) struct LegReaction<S: Simd> {
     /// Part normal to the leg.
     pub transverse: Lanes3<f64x8<S>>,
     /// Part along n.
-    pub axial: f64x8<S>,
+    pub axial_n: f64x8<S>,
 }
 
 impl<S: Simd> LegReaction<S> {
@@ -155,11 +155,11 @@ impl<S: Simd> LegReaction<S> {
                 if M::LEGS == LegInertia::Lumped { &constants.lumped_mass } else { &constants.platform_mass };
             return Self {
                 transverse: (joint_acceleration - gravity) * load(mass),
-                axial: f64x8::splat(simd, 0.0),
+                axial_n: f64x8::splat(simd, 0.0),
             };
         }
         let (n, n_rate, length, inverse_length) =
-            (legs.direction, velocity.direction, legs.length, legs.inverse_length);
+            (legs.direction, velocity.direction, legs.length_m, legs.inverse_length_per_m);
         let [jt2, jt1, jt0] = constants.jt.each_ref().map(load);
         let (m2, m2_e2) = (load(&constants.rod_mass), load(&constants.rod_moment));
 
@@ -168,7 +168,7 @@ impl<S: Simd> LegReaction<S> {
         let mut transverse = (joint_acceleration * j).minus_scaled(mu, gravity);
         if M::VELOCITY {
             let m2_r_over_l = m2 - m2_e2 * inverse_length;
-            let twice_rate = velocity.rate + velocity.rate;
+            let twice_rate = velocity.rate_m_s + velocity.rate_m_s;
             transverse = transverse.plus_scaled(twice_rate * (m2_r_over_l - j), n_rate);
         }
         if M::SPIN {
@@ -181,7 +181,7 @@ impl<S: Simd> LegReaction<S> {
         if M::VELOCITY {
             axial = m2_e2.fused_mul_add(n_rate.dot(n_rate), axial);
         }
-        Self { transverse, axial }
+        Self { transverse, axial_n: axial }
     }
 }
 
@@ -202,9 +202,9 @@ impl LegConstants {
         legs: &LegGeometry<S>,
     ) -> [JointForces<S>; 3] {
         let load = |lanes: &LegLanes| lanes.load(simd);
-        let (n, square) = (legs.direction, legs.inverse_length * legs.inverse_length);
+        let (n, square) = (legs.direction, legs.inverse_length_per_m * legs.inverse_length_per_m);
         let [jt2, jt1, jt0] = self.jt.each_ref().map(load);
-        let j = jt2.fused_mul_add(legs.length, jt1).fused_mul_add(legs.length, jt0) * square;
+        let j = jt2.fused_mul_add(legs.length_m, jt1).fused_mul_add(legs.length_m, jt0) * square;
         let u = Lanes3::load(simd, &machine.joints.universal_axis);
         let k = u.cross(n);
         let un_over_yy = u.dot(n) / k.dot(k).max(f64x8::splat(simd, MIN_UNIVERSAL_SINE_SQUARED));
@@ -237,8 +237,8 @@ fn spin<S: Simd>(
     let k = u.cross(n);
     let inverse_yy = f64x8::splat(simd, 1.0) / k.dot(k).max(f64x8::splat(simd, MIN_UNIVERSAL_SINE_SQUARED));
     let (un, un_rate, p) = (u.dot(n), u.dot(n_rate), n_rate.dot(k));
-    let twice_rate = velocity.rate + velocity.rate;
-    let p_rate = (joint_acceleration.dot(k) - twice_rate * p) * legs.inverse_length;
+    let twice_rate = velocity.rate_m_s + velocity.rate_m_s;
+    let p_rate = (joint_acceleration.dot(k) - twice_rate * p) * legs.inverse_length_per_m;
     let un_over_yy = un * inverse_yy;
     let wx = un_over_yy * p;
     let wx_un = wx * un;

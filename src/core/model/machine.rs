@@ -28,7 +28,7 @@ use super::triples::{LegLanes, Triples};
 #[derive(Clone, Debug)]
 pub struct Machine {
     /// Acceleration of gravity in base axes, g \[m/s^2\].
-    pub gravity: Vector3<f64>,
+    pub gravity_m_s2: Vector3<f64>,
     /// Everything that moves with the end effector, payload included.
     pub platform: Platform,
     /// Joint centres and universal-joint axes.
@@ -42,7 +42,7 @@ pub struct Machine {
     /// Task coordinates X of the home pose: Bryan angles \[rad\], position \[m\].
     pub home: [f64; 6],
     /// Largest rotation of the platform from home that its joints permit \[rad\].
-    pub max_rotation: f64,
+    pub max_rotation_rad: f64,
     /// Instruction set of the lanes, detected once. See [`at_most_256_bits`].
     pub level: Level,
 }
@@ -74,9 +74,9 @@ pub fn has_native_arithmetic(level: Level) -> bool {
 #[derive(Clone, Debug)]
 pub struct Platform {
     /// Mass \[kg\].
-    pub mass: f64,
+    pub mass_kg: f64,
     /// CG, from the platform origin C to the centre of mass \[m\].
-    pub center_of_mass: Vector3<f64>,
+    pub center_of_mass_m: Vector3<f64>,
     /// Inertia about the **centre of mass** \[kg m^2\].
     pub inertia: Matrix3<f64>,
 }
@@ -94,12 +94,12 @@ pub struct Joints {
     pub universal_axis: [LegLanes; 3],
     /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. It converts
     /// radians to metres where a tolerance must not depend on the size of the machine.
-    pub radius: f64,
+    pub radius_m: f64,
     /// Cube of the radius \[m^3\], and its inverse with the parity of the lane order as sign.
-    pub(super) radius_cubed: f64,
-    pub(super) inverse_radius_cubed: f64,
+    pub(super) radius_cubed_m3: f64,
+    pub(super) inverse_radius_cubed_per_m3: f64,
     /// Mean of the `B_i`, from C, in platform axes \[m\]. This point does not depend on the choice of C.
-    pub(super) center: Vector3<f64>,
+    pub(super) center_m: Vector3<f64>,
     /// The `B_i` from their mean, in platform axes \[m\].
     pub(super) around_center: [LegLanes; 3],
     /// Length `a` of that arm relative to the radius, and `(1 + a^2) radius`: see `super::sensitivity`.
@@ -111,8 +111,8 @@ impl Machine {
     /// Machine whose stroke is shorter at both ends by a margin \[m\].
     pub fn within_margin(&self, margin: f64) -> Self {
         let mut machine = self.clone();
-        machine.actuator.min_length += margin;
-        machine.actuator.max_length -= margin;
+        machine.actuator.min_length_m += margin;
+        machine.actuator.max_length_m -= margin;
         machine
     }
 
@@ -145,10 +145,10 @@ impl Joints {
             base: triples.pack_vectors(base),
             platform: triples.pack_vectors(platform),
             universal_axis: triples.pack_vectors(universal_axis),
-            radius,
-            radius_cubed: radius * radius * radius,
-            inverse_radius_cubed: triples.parity() / (radius * radius * radius),
-            center,
+            radius_m: radius,
+            radius_cubed_m3: radius * radius * radius,
+            inverse_radius_cubed_per_m3: triples.parity() / (radius * radius * radius),
+            center_m: center,
             around_center: triples.pack_vectors(&around_center),
             arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)),
             arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)),
@@ -159,14 +159,14 @@ impl Joints {
     /// \[radius\].
     pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
         let turn = a.displacement_to(b).angular;
-        let center = |pose: &Pose| pose.position + pose.rotation * self.center;
-        let shift = (center(b) - center(a)) / self.radius;
+        let center = |pose: &Pose| pose.position + pose.rotation * self.center_m;
+        let shift = (center(b) - center(a)) / self.radius_m;
         (turn.norm_squared() + shift.norm_squared()).sqrt()
     }
 
     /// Converts a twist at the mean of the joints on the platform to a twist at C.
     pub(super) fn twist_of_origin(&self, twist: &Twist, rotation: &Matrix3<f64>) -> Twist {
-        let arm = rotation * self.center;
+        let arm = rotation * self.center_m;
         Twist { angular: twist.angular, linear: twist.linear - twist.angular.cross(&arm) }
     }
 
@@ -174,12 +174,12 @@ impl Joints {
     /// The leg in that lane begins far outside any platform.
     pub(super) fn with_point(&self, point: &Vector3<f64>) -> Self {
         let mut joints = self.clone();
-        let around_center = point - self.center;
+        let around_center = point - self.center_m;
         let lanes = joints.platform.iter_mut().chain(&mut joints.around_center);
         for (lane, value) in lanes.zip(point.iter().chain(&around_center)) {
             *lane = lane.with_padding(*value);
         }
-        let far = 1e3 * (self.radius + point.norm());
+        let far = 1e3 * (self.radius_m + point.norm());
         joints.base = joints.base.map(|lane| lane.with_padding(far));
         joints
     }
@@ -189,12 +189,12 @@ impl Joints {
 #[derive(Clone, Debug)]
 pub struct Link {
     /// Mass \[kg\].
-    pub mass: f64,
+    pub mass_kg: f64,
     /// Distance of the centre of mass from the link's own joint \[m\]: cylinder, `e1`, from `A_i`
     /// toward `B_i`; rod, `e2`, from `B_i` back toward `A_i`.
-    pub center_of_mass: f64,
+    pub center_of_mass_m: f64,
     /// Inertia about the leg's axis \[kg m^2\].
-    pub axial_inertia: f64,
+    pub axial_inertia_kg_m2: f64,
     /// Inertia about any axis through the centre of mass and normal to the leg \[kg m^2\].
     pub transverse_inertia: TransverseInertia,
 }
@@ -206,18 +206,18 @@ pub struct Link {
 #[derive(Clone, Debug)]
 pub struct TransverseInertia {
     /// Constant part \[kg m^2\].
-    pub constant: f64,
+    pub constant_kg_m2: f64,
     /// Quadratic coefficient \[kg\].
-    pub quadratic: f64,
+    pub quadratic_kg: f64,
     /// Reference length of the leg \[m\].
-    pub reference_length: f64,
+    pub reference_length_m: f64,
 }
 
 impl TransverseInertia {
     /// Inertia at the length L of the leg \[kg m^2\].
     pub fn at(&self, length: f64) -> f64 {
-        let change = length - self.reference_length;
-        self.constant + self.quadratic * change * change
+        let change = length - self.reference_length_m;
+        self.constant_kg_m2 + self.quadratic_kg * change * change
     }
 }
 
@@ -225,28 +225,28 @@ impl TransverseInertia {
 #[derive(Clone, Debug)]
 pub struct Actuator {
     /// Shortest leg \[m\].
-    pub min_length: f64,
+    pub min_length_m: f64,
     /// Longest leg \[m\].
-    pub max_length: f64,
+    pub max_length_m: f64,
     /// Largest speed of the leg \[m/s\].
-    pub max_rate: f64,
+    pub max_rate_m_s: f64,
     /// Largest command \[N\].
-    pub max_force: f64,
+    pub max_force_n: f64,
     /// Inertia of motor and screw, seen along the leg \[kg\].
-    pub reflected_mass: f64,
+    pub reflected_mass_kg: f64,
     /// Viscous friction of each leg \[N s/m\].
-    pub viscous_friction: [f64; LEGS],
+    pub viscous_friction_n_s_m: [f64; LEGS],
     /// Coulomb friction of each leg \[N\].
-    pub coulomb_friction: [f64; LEGS],
+    pub coulomb_friction_n: [f64; LEGS],
     /// Friction of each leg as a share of the force of its drive.
-    pub load_friction: [f64; LEGS],
+    pub load_friction_share: [f64; LEGS],
     /// Real over commanded force of each drive.
     pub force_scale: [f64; LEGS],
     /// Largest dry friction that the model may lack \[N\]. The checks under control permit it.
-    pub friction_uncertainty: f64,
+    pub friction_uncertainty_n: f64,
     /// Speed above which the Coulomb force has its full value \[m/s\]; below it the force is proportional to
     /// speed.
-    pub coulomb_smoothing: f64,
+    pub coulomb_smoothing_m_s: f64,
 }
 
 impl Actuator {
@@ -258,38 +258,38 @@ impl Actuator {
     /// machine is as strong as its weakest leg; the others differ by a few percent.
     pub fn available_force(&self) -> f64 {
         let share = |(scale, load_friction): (&f64, &f64)| scale * (1.0 - load_friction);
-        self.max_force
-            * self.force_scale.iter().zip(&self.load_friction).map(share).fold(f64::INFINITY, f64::min)
+        self.max_force_n
+            * self.force_scale.iter().zip(&self.load_friction_share).map(share).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether legs get other forces than their drives are told.
     pub fn transmits_otherwise(&self) -> bool {
-        self.force_scale != [1.0; LEGS] || self.load_friction != [0.0; LEGS]
+        self.force_scale != [1.0; LEGS] || self.load_friction_share != [0.0; LEGS]
     }
 
     /// Largest viscous friction of a leg \[N s/m\].
     pub fn largest_viscous_friction(&self) -> f64 {
-        self.viscous_friction.into_iter().fold(0.0, f64::max)
+        self.viscous_friction_n_s_m.into_iter().fold(0.0, f64::max)
     }
 
     /// Largest Coulomb friction of a leg \[N\].
     pub fn largest_coulomb_friction(&self) -> f64 {
-        self.coulomb_friction.into_iter().fold(0.0, f64::max)
+        self.coulomb_friction_n.into_iter().fold(0.0, f64::max)
     }
 
     /// sign(L') of dry friction, proportional to L' below the smoothing speed.
     pub fn sign(&self, rate: f64) -> f64 {
-        (rate / self.coulomb_smoothing).clamp(-1.0, 1.0)
+        (rate / self.coulomb_smoothing_m_s).clamp(-1.0, 1.0)
     }
 
     /// Length of the stroke \[m\].
     pub fn stroke(&self) -> f64 {
-        self.max_length - self.min_length
+        self.max_length_m - self.min_length_m
     }
 
     /// Whether a leg length is within the stroke; false for NaN.
     pub fn contains(&self, length: f64) -> bool {
-        (self.min_length..=self.max_length).contains(&length)
+        (self.min_length_m..=self.max_length_m).contains(&length)
     }
 
     /// Distance of a leg length from the nearer end of the stroke \[m\]; negative outside the stroke.
@@ -301,6 +301,6 @@ impl Actuator {
     /// assert!(actuator.margin(actuator.max_length + 0.01) < 0.0);
     /// ```
     pub fn margin(&self, length: f64) -> f64 {
-        (length - self.min_length).min(self.max_length - length)
+        (length - self.min_length_m).min(self.max_length_m - length)
     }
 }

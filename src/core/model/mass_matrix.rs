@@ -45,7 +45,7 @@ pub struct MassMatrix {
 impl MassMatrix {
     /// Computes the constants.
     pub fn new(machine: &Machine) -> Self {
-        let weightless = Machine { gravity: Vector3::zeros(), ..machine.clone() };
+        let weightless = Machine { gravity_m_s2: Vector3::zeros(), ..machine.clone() };
         Self { weightless: InverseDynamics::new(&weightless) }
     }
 

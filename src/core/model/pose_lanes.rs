@@ -83,7 +83,7 @@ impl InverseDynamics {
                 let lanes = a.into_iter().zip(b).zip(c).zip(d.into_iter().zip(e).zip(f));
                 let lanes = lanes.zip(d_a.into_iter().zip(d_s));
                 for ((force, motion), ((((a, b), c), ((d, e), f)), (d_a, d_s))) in forces.iter_mut().zip(motions).zip(lanes) {
-                    *force = if are_regular_blocks(d_a, d_s, self.joints().radius_cubed) {
+                    *force = if are_regular_blocks(d_a, d_s, self.joints().radius_cubed_m3) {
                         Some(self.joints().triples.unpack(&LegLanes([a, b, c, 0.0, d, e, f, 0.0])))
                     } else {
                         self.forces::<M>(motion)
@@ -129,9 +129,9 @@ impl InverseDynamics {
         let map = acceleration_map(omega, turning);
 
         let platform = &self.machine().platform;
-        let arm = motions.rotation.times_vector(simd, &platform.center_of_mass);
-        let gravity = Lanes3::splat(simd, &self.machine().gravity);
-        let mut force = (linear + map.times(arm) - gravity) * f64x8::splat(simd, platform.mass);
+        let arm = motions.rotation.times_vector(simd, &platform.center_of_mass_m);
+        let gravity = Lanes3::splat(simd, &self.machine().gravity_m_s2);
+        let mut force = (linear + map.times(arm) - gravity) * f64x8::splat(simd, platform.mass_kg);
         let mut torque = arm.cross(force);
         if M::ACCELERATION {
             let (w, a) =
@@ -153,7 +153,7 @@ impl InverseDynamics {
                 force = force + reaction.transverse;
                 torque = torque + arm.cross(reaction.transverse);
             }
-            let mut axial = reaction.axial;
+            let mut axial = reaction.axial_n;
             if M::ACCELERATION {
                 let mut accel = leg.direction.dot(joint_acceleration);
                 if M::VELOCITY {
@@ -161,7 +161,7 @@ impl InverseDynamics {
                 }
                 let friction =
                     [f64x8::splat(simd, joint.viscous_friction), f64x8::splat(simd, joint.coulomb_friction)];
-                axial += self.drive_force(simd, friction, velocity.rate, accel);
+                axial += self.drive_force(simd, friction, velocity.rate_m_s, accel);
             }
             *column = LoadedColumn { column: Column::new(arm, leg.direction), axial };
         }

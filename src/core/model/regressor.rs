@@ -90,11 +90,11 @@ pub const INDISTINGUISHABLE_PAIRS: [[usize; 2]; 2] = [[11, 16], [12, 17]];
 pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
     let (platform, cylinder, rod, actuator) =
         (&machine.platform, &machine.cylinder, &machine.rod, &machine.actuator);
-    let moment = platform.center_of_mass * platform.mass;
-    let inertia = platform.inertia + point_inertia(&platform.center_of_mass) * platform.mass;
-    let (m1_e1, m2_e2) = (cylinder.mass * cylinder.center_of_mass, rod.mass * rod.center_of_mass);
+    let moment = platform.center_of_mass_m * platform.mass_kg;
+    let inertia = platform.inertia + point_inertia(&platform.center_of_mass_m) * platform.mass_kg;
+    let (m1_e1, m2_e2) = (cylinder.mass_kg * cylinder.center_of_mass_m, rod.mass_kg * rod.center_of_mass_m);
     let bodies = [
-        platform.mass,
+        platform.mass_kg,
         moment.x,
         moment.y,
         moment.z,
@@ -105,17 +105,17 @@ pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
         inertia.m13,
         inertia.m23,
         m1_e1,
-        m1_e1 * cylinder.center_of_mass + cylinder.transverse_inertia.constant,
-        cylinder.axial_inertia,
-        cylinder.transverse_inertia.quadratic,
-        rod.mass,
+        m1_e1 * cylinder.center_of_mass_m + cylinder.transverse_inertia.constant_kg_m2,
+        cylinder.axial_inertia_kg_m2,
+        cylinder.transverse_inertia.quadratic_kg,
+        rod.mass_kg,
         m2_e2,
-        m2_e2 * rod.center_of_mass + rod.transverse_inertia.constant,
-        rod.axial_inertia,
-        rod.transverse_inertia.quadratic,
-        actuator.reflected_mass,
+        m2_e2 * rod.center_of_mass_m + rod.transverse_inertia.constant_kg_m2,
+        rod.axial_inertia_kg_m2,
+        rod.transverse_inertia.quadratic_kg,
+        actuator.reflected_mass_kg,
     ];
-    let friction = actuator.viscous_friction.into_iter().chain(actuator.coulomb_friction);
+    let friction = actuator.viscous_friction_n_s_m.into_iter().chain(actuator.coulomb_friction_n);
     SVector::from_iterator(bodies.into_iter().chain(friction))
 }
 
@@ -163,7 +163,7 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     let [platform, axes] =
         [&joints.platform, &joints.universal_axis].map(|lanes| joints.triples.unpack_vectors(lanes));
     let directions = leg_directions(machine, &motion.pose);
-    let LegMotion { length, rate, accel } = leg_motion(machine, motion);
+    let LegMotion { length_m: length, rate_m_s: rate, accel_m_s2: accel } = leg_motion(machine, motion);
     let map = acceleration_map(&motion.twist, &motion.acceleration);
 
     let mut wrenches = Regressor::zeros();
@@ -192,7 +192,7 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
 fn add_platform(wrenches: &mut Regressor, machine: &Machine, motion: &Motion, map: &Matrix3<f64>) {
     let rotation = &motion.pose.rotation;
     let (omega, omega_rate) = (&motion.twist.angular, &motion.acceleration.angular);
-    let proper_acceleration = motion.acceleration.linear - machine.gravity;
+    let proper_acceleration = motion.acceleration.linear - machine.gravity_m_s2;
     let mut columns = wrenches.column_iter_mut();
     let mut add = |torque: Vector3<f64>, force: Vector3<f64>| {
         if let Some(mut column) = columns.next() {
@@ -235,7 +235,7 @@ impl LegKinematics {
     /// Adds columns 10..18, as wrenches about C.
     fn add(&self, wrenches: &mut Regressor, machine: &Machine, universal_axis: &Vector3<f64>) {
         let Self { arm, n, n_rate, n_accel, length, rate, accel } = self;
-        let g = &machine.gravity;
+        let g = &machine.gravity_m_s2;
         let turning = n_rate.norm_squared();
         let spin = self.spin(universal_axis);
         let quadratic = |reference: f64| n_accel * (length - reference).powi(2);
@@ -244,12 +244,12 @@ impl LegKinematics {
             (-g, 0.0),
             (*n_accel, 0.0),
             (spin, 0.0),
-            (quadratic(machine.cylinder.transverse_inertia.reference_length), 0.0),
+            (quadratic(machine.cylinder.transverse_inertia.reference_length_m), 0.0),
             ((n_accel * *length + n_rate * (2.0 * rate) - g) * *length, accel - length * turning - g.dot(n)),
             (g - n_accel * (2.0 * length) - n_rate * (2.0 * rate), turning),
             (*n_accel, 0.0),
             (spin, 0.0),
-            (quadratic(machine.rod.transverse_inertia.reference_length), 0.0),
+            (quadratic(machine.rod.transverse_inertia.reference_length_m), 0.0),
         ];
         for (mut column, (q, along)) in wrenches.columns_mut(10, 9).column_iter_mut().zip(terms) {
             let force = (q - n * q.dot(n)) / *length + n * along;

@@ -76,9 +76,9 @@ impl Sensitivity {
         legs: &LegGeometry<S>,
         factorization: &Factorization<S>,
     ) -> (Self, f64) {
-        let inverse_radius = f64x8::splat(simd, 1.0 / joints.radius);
+        let inverse_radius = f64x8::splat(simd, 1.0 / joints.radius_m);
         let (share, arm_curvature) = (joints.arm_share.load(simd), joints.arm_curvature.load(simd));
-        let curvature = arm_curvature.fused_mul_add(legs.inverse_length, share);
+        let curvature = arm_curvature.fused_mul_add(legs.inverse_length_per_m, share);
         let moment = legs.arm.cross(legs.direction) * inverse_radius;
         let (curvature, wrench) =
             (sum_legs(curvature * curvature), sum_legs(moment.dot(moment) + f64x8::splat(simd, 1.0)));
@@ -86,7 +86,7 @@ impl Sensitivity {
         let sensitivity = Self {
             condition: (wrench * inverse).sqrt(),
             norm: wrench.sqrt(),
-            determinant: factorization.determinant() * joints.inverse_radius_cubed,
+            determinant: factorization.determinant() * joints.inverse_radius_cubed_per_m3,
             trusted_step: MAX_KANTOROVICH_H / (curvature * inverse).sqrt(),
         };
         (sensitivity, largest_row.sqrt())
@@ -112,9 +112,9 @@ fn inverse_norms_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGe
     let simd = factorization.simd;
     if !factorization.uses_blocks {
         let n = wrench_columns(&factorization.joints.triples, legs);
-        return inverse_norms_squared_by_lu(simd.level(), &n, factorization.joints.radius);
+        return inverse_norms_squared_by_lu(simd.level(), &n, factorization.joints.radius_m);
     }
-    let r = f64x4::splat(simd, factorization.joints.radius);
+    let r = f64x4::splat(simd, factorization.joints.radius_m);
     let [i0, i1, i2] = factorization.inverse_a.broadcasts();
     let [m0, m1, m2] = factorization.moment_a.broadcasts();
     let t = factorization.adjugate_s * factorization.inverse_d_s;

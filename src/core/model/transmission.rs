@@ -43,7 +43,7 @@ impl Transmission {
         }
         let mut ratios = [actuator.force_scale; 2];
         let [pulling, pushing] = &mut ratios;
-        let legs = actuator.load_friction.iter().zip(rates);
+        let legs = actuator.load_friction_share.iter().zip(rates);
         for ((load_friction, rate), (pull, push)) in legs.zip(pulling.iter_mut().zip(pushing)) {
             let loss = load_friction * actuator.sign(*rate);
             *pull *= 1.0 + loss;

@@ -78,9 +78,9 @@ pub struct FittedMotion {
     /// Its shape.
     pub motion: BuiltInMotion,
     /// Duration \[s\].
-    pub duration: f64,
+    pub duration_s: f64,
     /// Amplitude in position \[m\].
-    pub position_amplitude: f64,
+    pub position_amplitude_m: f64,
     /// Amplitude in angle as a share of the motion's nominal angles.
     pub angle_share: f64,
     home: Vector6<f64>,
@@ -103,7 +103,7 @@ impl FittedMotion {
     /// The same motion with a share of its amplitude.
     pub fn smaller(&self, share: f64) -> Self {
         Self {
-            position_amplitude: share * self.position_amplitude,
+            position_amplitude_m: share * self.position_amplitude_m,
             angle_share: share * self.angle_share,
             ..*self
         }
@@ -111,11 +111,11 @@ impl FittedMotion {
 
     fn faded(&self, t: f64, d: &TaskState) -> TaskState {
         // A motion too short for both fades is all fade.
-        scaled_by_profile(d, &window(t, self.duration, FADE_S.min(0.5 * self.duration)))
+        scaled_by_profile(d, &window(t, self.duration_s, FADE_S.min(0.5 * self.duration_s)))
     }
 
     fn amplitude(&self, angle: f64) -> Vector6<f64> {
-        let (a, p) = (angle * self.angle_share, self.position_amplitude);
+        let (a, p) = (angle * self.angle_share, self.position_amplitude_m);
         Vector6::new(a, a, a, p, p, p)
     }
 
@@ -127,13 +127,13 @@ impl FittedMotion {
     }
 
     fn circle(&self, t: f64) -> TaskState {
-        let p = self.position_amplitude;
+        let p = self.position_amplitude_m;
         let phase = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.25 * TAU, 0.0);
         harmonic(&Vector6::new(0.0, 0.0, 0.0, 0.0, p, p), &Vector6::repeat(0.5 * TAU), &phase, t)
     }
 
     fn paper(&self, t: f64) -> TaskState {
-        let p = self.position_amplitude;
+        let p = self.position_amplitude_m;
         let omega = Vector6::new(0.0, 0.0, 0.0, 0.25, 0.5, 0.5) * TAU;
         let phase = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.25 * TAU, 0.0);
         let mut state = harmonic(&Vector6::new(0.0, 0.0, 0.0, 0.5 * p, p, p), &omega, &phase, t);
@@ -143,7 +143,7 @@ impl FittedMotion {
 
     /// Twelve moves: along each axis out and back, the angles first.
     fn moves(&self, t: f64) -> TaskState {
-        let each = self.duration / 12.0;
+        let each = self.duration_s / 12.0;
         let number = (t / each).floor().clamp(0.0, 11.0);
         let axis = (number * 0.5).floor() as usize;
         let away = Vector6::ith(axis.min(5), 1.0).component_mul(&self.amplitude(ANGLE_AMPLITUDE_RAD));
@@ -171,8 +171,8 @@ fn harmonic(amplitude: &Vector6<f64>, omega: &Vector6<f64>, phase: &Vector6<f64>
 pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMotion {
     let sized = |share: f64| FittedMotion {
         motion,
-        duration,
-        position_amplitude: share * POSITION_OVER_RADIUS * machine.joints.radius,
+        duration_s: duration,
+        position_amplitude_m: share * POSITION_OVER_RADIUS * machine.joints.radius_m,
         angle_share: share,
         home: machine.home.into(),
     };
@@ -192,7 +192,7 @@ pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMot
 fn has_reserve(model: &InverseDynamics, fitted: &FittedMotion) -> bool {
     const SAMPLES: u32 = 1000;
     (0..=SAMPLES)
-        .all(|k| keeps_reserve(model, &fitted.at(fitted.duration * f64::from(k) / f64::from(SAMPLES))))
+        .all(|k| keeps_reserve(model, &fitted.at(fitted.duration_s * f64::from(k) / f64::from(SAMPLES))))
 }
 
 /// Whether stroke, rates and forces keep a reserve of a fifth at one state; false at a singular pose.
@@ -201,8 +201,8 @@ pub fn keeps_reserve(model: &InverseDynamics, state: &TaskState) -> bool {
     let actuator = &machine.actuator;
     let margin = 0.5 * (1.0 - USABLE_SHARE) * actuator.stroke();
     let legs = leg_motion(machine, &motion);
-    legs.length.iter().all(|length| actuator.margin(*length) >= margin)
-        && legs.rate.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate)
+    legs.length_m.iter().all(|length| actuator.margin(*length) >= margin)
+        && legs.rate_m_s.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate_m_s)
         && model
             .forces::<Exact>(&motion)
             .is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.available_force()))

@@ -100,7 +100,7 @@ impl Excitation {
 
     /// Duration \[s\].
     pub fn duration(&self) -> f64 {
-        self.blended_out() + self.delay_motion.duration
+        self.blended_out() + self.delay_motion.duration_s
     }
 
     /// X, X', X'' at `t` seconds after the start; at rest at home outside \[0, duration\].

@@ -10,7 +10,7 @@ use nalgebra::Vector6;
 use crate::model::task::TaskState;
 
 /// Peak of s' for a unit duration: peak velocity of a move over its mean.
-pub const PEAK_RATE: f64 = 1.875;
+pub const PEAK_RATE_RATIO: f64 = 1.875;
 
 /// Peaks of the second and third derivative of s for a unit duration: 10 / sqrt 3, and 60 at both ends.
 const PEAK_ACCEL: f64 = 5.773502691896258;
@@ -25,7 +25,7 @@ const PEAK_JERK: f64 = 60.0;
 /// assert!((duration - PEAK_RATE * 0.3 / 0.1).abs() < 1e-12);
 /// ```
 pub fn shortest_duration(distance: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
-    let by_rate = PEAK_RATE * distance / velocity;
+    let by_rate = PEAK_RATE_RATIO * distance / velocity;
     by_rate.max((PEAK_ACCEL * distance / acceleration).sqrt()).max((PEAK_JERK * distance / jerk).cbrt())
 }
 
@@ -33,11 +33,11 @@ pub fn shortest_duration(distance: f64, [velocity, acceleration, jerk]: [f64; 3]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Profile {
     /// s
-    pub value: f64,
+    pub value_share: f64,
     /// s' \[1/s\]
-    pub rate: f64,
+    pub rate_per_s: f64,
     /// s'' \[1/s^2\]
-    pub accel: f64,
+    pub accel_per_s2: f64,
 }
 
 /// The profile from 0 at `t = 0` to 1 at `t = duration`; constant outside.
@@ -55,33 +55,33 @@ pub fn rise(t: f64, duration: f64) -> Profile {
         return Profile::default();
     }
     if u >= 1.0 {
-        return Profile { value: 1.0, ..Profile::default() };
+        return Profile { value_share: 1.0, ..Profile::default() };
     }
     Profile {
-        value: u * u * u * (10.0 + u * (-15.0 + u * 6.0)),
-        rate: u * u * (30.0 + u * (-60.0 + u * 30.0)) / duration,
-        accel: u * (60.0 + u * (-180.0 + u * 120.0)) / (duration * duration),
+        value_share: u * u * u * (10.0 + u * (-15.0 + u * 6.0)),
+        rate_per_s: u * u * (30.0 + u * (-60.0 + u * 30.0)) / duration,
+        accel_per_s2: u * (60.0 + u * (-180.0 + u * 120.0)) / (duration * duration),
     }
 }
 
 /// Rises during the first `fade` seconds, is 1, and falls during the last `fade` seconds before `end`.
 pub fn window(t: f64, end: f64, fade: f64) -> Profile {
     let (up, down) = (rise(t, fade), rise(t - (end - fade), fade));
-    Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel }
+    Profile { value_share: up.value_share - down.value_share, rate_per_s: up.rate_per_s - down.rate_per_s, accel_per_s2: up.accel_per_s2 - down.accel_per_s2 }
 }
 
 /// The straight move in task coordinates along this profile.
 pub fn straight_move(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
     let change = to - from;
-    TaskState { x: from + change * s.value, xd: change * s.rate, xdd: change * s.accel }
+    TaskState { x: from + change * s.value_share, xd: change * s.rate_per_s, xdd: change * s.accel_per_s2 }
 }
 
 /// `s(t) d(t)` with both derivatives, by the product rule.
 pub fn scaled_by_profile(d: &TaskState, s: &Profile) -> TaskState {
     TaskState {
-        x: d.x * s.value,
-        xd: d.xd * s.value + d.x * s.rate,
-        xdd: d.xdd * s.value + d.xd * (2.0 * s.rate) + d.x * s.accel,
+        x: d.x * s.value_share,
+        xd: d.xd * s.value_share + d.x * s.rate_per_s,
+        xdd: d.xdd * s.value_share + d.xd * (2.0 * s.rate_per_s) + d.x * s.accel_per_s2,
     }
 }
 
@@ -95,16 +95,16 @@ mod tests {
         for k in 0..=100 {
             let t = -0.5 + 0.04 * f64::from(k);
             let (a, b, c) = (window(t - h, 3.0, 0.8), window(t, 3.0, 0.8), window(t + h, 3.0, 0.8));
-            assert!(((c.value - a.value) / (2.0 * h) - b.rate).abs() < 1e-8);
-            assert!(((c.rate - a.rate) / (2.0 * h) - b.accel).abs() < 1e-3);
+            assert!(((c.value_share - a.value_share) / (2.0 * h) - b.rate_per_s).abs() < 1e-8);
+            assert!(((c.rate_per_s - a.rate_per_s) / (2.0 * h) - b.accel_per_s2).abs() < 1e-3);
         }
         assert_eq!(window(0.0, 3.0, 0.8), Profile::default());
         let end = window(3.0, 3.0, 0.8);
-        assert!(end.value.abs() < 1e-15 && end.rate.abs() < 1e-12 && end.accel.abs() < 1e-12, "{end:?}");
-        assert_eq!(rise(0.5, 1.0).rate, PEAK_RATE);
-        let strongest = (0..=1000).map(|k| rise(f64::from(k) / 1000.0, 1.0).accel).fold(0.0, f64::max);
+        assert!(end.value_share.abs() < 1e-15 && end.rate_per_s.abs() < 1e-12 && end.accel_per_s2.abs() < 1e-12, "{end:?}");
+        assert_eq!(rise(0.5, 1.0).rate_per_s, PEAK_RATE_RATIO);
+        let strongest = (0..=1000).map(|k| rise(f64::from(k) / 1000.0, 1.0).accel_per_s2).fold(0.0, f64::max);
         assert!((strongest - PEAK_ACCEL).abs() < 1e-4);
-        assert!((rise(1e-6, 1.0).accel / 1e-6 - PEAK_JERK).abs() < 1e-3);
+        assert!((rise(1e-6, 1.0).accel_per_s2 / 1e-6 - PEAK_JERK).abs() < 1e-3);
     }
 
     #[test]
@@ -112,7 +112,7 @@ mod tests {
         let way = 0.3;
         for limits in [[0.1, 1e9, 1e9], [1e9, 0.1, 1e9], [1e9, 1e9, 0.1]] {
             let t = shortest_duration(way, limits);
-            let peaks = [PEAK_RATE * way / t, PEAK_ACCEL * way / (t * t), PEAK_JERK * way / (t * t * t)];
+            let peaks = [PEAK_RATE_RATIO * way / t, PEAK_ACCEL * way / (t * t), PEAK_JERK * way / (t * t * t)];
             let share = peaks.iter().zip(limits).map(|(peak, limit)| peak / limit).fold(0.0, f64::max);
             assert!((share - 1.0).abs() < 1e-12, "{share}");
         }

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector6;
 
-use super::minimum_jerk::{PEAK_RATE, rise, straight_move};
+use super::minimum_jerk::{PEAK_RATE_RATIO, rise, straight_move};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
@@ -46,7 +46,7 @@ impl Timeline {
             Vector6::from(leg_lengths(machine, &TaskState::at_rest((*x).into()).motion().pose))
         };
         let way = (lengths(to) - lengths(from)).amax();
-        let approach_s = PEAK_RATE * way / (APPROACH_RATE_SHARE * machine.actuator.max_rate);
+        let approach_s = PEAK_RATE_RATIO * way / (APPROACH_RATE_SHARE * machine.actuator.max_rate_m_s);
         // Shorter than this an approach of a fraction of a millimetre would be a jerk.
         Self { from: *from, to: *to, approach_s: approach_s.max(SETTLE_S), motion_s }
     }

@@ -36,11 +36,11 @@ impl ToolPath {
         let Twist { angular, linear } = self.displacement;
         self.frames.platform_motion(&Motion {
             pose: Pose {
-                rotation: exp(&(angular * s.value)) * self.from.rotation,
-                position: self.from.position + linear * s.value,
+                rotation: exp(&(angular * s.value_share)) * self.from.rotation,
+                position: self.from.position + linear * s.value_share,
             },
-            twist: Twist { angular: angular * s.rate, linear: linear * s.rate },
-            acceleration: Acceleration { angular: angular * s.accel, linear: linear * s.accel },
+            twist: Twist { angular: angular * s.rate_per_s, linear: linear * s.rate_per_s },
+            acceleration: Acceleration { angular: angular * s.accel_per_s2, linear: linear * s.accel_per_s2 },
         })
     }
 

@@ -11,7 +11,7 @@ use crate::model::task::TaskState;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knot {
     /// \[s\]
-    pub t: f64,
+    pub t_s: f64,
     /// X, X', X''.
     pub state: TaskState,
 }
@@ -27,10 +27,10 @@ pub struct Knot {
 /// assert!((middle.x[5] - 1.1).abs() < 1e-15 && (middle.xd[5] - 0.2 * 1.875 / 2.0).abs() < 1e-15);
 /// ```
 pub fn interpolate(knots: &[Knot], t: f64) -> Option<TaskState> {
-    let after = knots.partition_point(|knot| knot.t <= t);
+    let after = knots.partition_point(|knot| knot.t_s <= t);
     let Some(b) = knots.get(after) else { return knots.last().map(|knot| knot.state) };
     let Some(a) = after.checked_sub(1).and_then(|before| knots.get(before)) else { return Some(b.state) };
-    Some(quintic(&a.state, &b.state, t - a.t, b.t - a.t))
+    Some(quintic(&a.state, &b.state, t - a.t_s, b.t_s - a.t_s))
 }
 
 /// The quintic from `a` to `b` over `h` seconds, at `t`.
@@ -62,7 +62,7 @@ mod tests {
             xd: Vector6::repeat(-1.0 + 3.0 * t.powi(2) - t.powi(4)),
             xdd: Vector6::repeat(6.0 * t - 4.0 * t.powi(3)),
         };
-        let knots = [0.0, 0.3, 1.1, 2.0].map(|t| Knot { t, state: exact(t) });
+        let knots = [0.0, 0.3, 1.1, 2.0].map(|t| Knot { t_s: t, state: exact(t) });
         for k in 0..=20 {
             let t = 0.1 * f64::from(k);
             let (found, wanted) = (interpolate(&knots, t).unwrap(), exact(t));

@@ -46,7 +46,7 @@ impl Hardware {
 
     /// Advances by `duration_ns` under a constant command.
     pub fn advance(&mut self, duration_ns: u64, command: DriveCommand) {
-        let command = command.map(|force| force.map(|newtons| rounded(newtons, self.drive.force_step)));
+        let command = command.map(|force| force.map(|newtons| rounded(newtons, self.drive.force_step_n)));
         let Self { simulator, delay, .. } = self;
         delay.pass(duration_ns, command, |nanoseconds, command| {
             simulator.advance(nanoseconds as f64 * 1e-9, command.as_ref());
@@ -61,14 +61,14 @@ impl Hardware {
     /// Lengths \[m\] and rates \[m/s\] as the sensors measure them now. Each reading draws its own noise.
     pub fn measure(&mut self) -> ([f64; LEGS], [f64; LEGS]) {
         let legs = self.simulator.leg_motion();
-        let SensorErrors { length_step, rate_step, length_noise, rate_noise } = self.sensor;
+        let SensorErrors { length_step_m: length_step, rate_step_m_s: rate_step, length_noise_m: length_noise, rate_noise_m_s: rate_noise } = self.sensor;
         let mut read = |values: [f64; LEGS], noise: f64, step: f64| {
             values.map(|value| {
                 let noise = if noise > 0.0 { noise * self.random.gaussian() } else { 0.0 };
                 rounded(value + noise, step)
             })
         };
-        (read(legs.length, length_noise, length_step), read(legs.rate, rate_noise, rate_step))
+        (read(legs.length_m, length_noise, length_step), read(legs.rate_m_s, rate_noise, rate_step))
     }
 }
 

@@ -45,7 +45,7 @@ pub struct DriveErrors {
     /// Corner frequency of the first-order lag of the force \[Hz\]; `None` if it follows at once.
     pub bandwidth_hz: Option<f64>,
     /// Smallest difference of forces \[N\]; 0 if there is none.
-    pub force_step: f64,
+    pub force_step_n: f64,
     /// From the command to the drive \[ns\].
     pub dead_time_ns: u64,
 }
@@ -54,48 +54,48 @@ pub struct DriveErrors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// \[N s/m\]
-    pub viscous: f64,
+    pub viscous_n_s_m: f64,
     /// \[N\]
-    pub coulomb: f64,
+    pub coulomb_n: f64,
     /// Excess of the breakaway force over sliding friction \[N\].
-    pub stiction: f64,
+    pub stiction_n: f64,
     /// Speed at which most of the stiction is gone \[m/s\].
-    pub stribeck_speed: f64,
+    pub stribeck_speed_m_s: f64,
 }
 
 /// Elastic leg: a spring with play between drive and rod.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElasticLeg {
     /// \[N/m\]
-    pub stiffness: f64,
+    pub stiffness_n_per_m: f64,
     /// \[N s/m\]
-    pub damping: f64,
+    pub damping_n_s_m: f64,
     /// Play from one flank to the other \[m\].
-    pub backlash: f64,
+    pub backlash_m: f64,
 }
 
 /// Errors of the sensors of lengths and rates. Noise is Gaussian and added before the value is rounded to a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorErrors {
     /// Resolution of lengths \[m\]; 0 if they are not rounded.
-    pub length_step: f64,
+    pub length_step_m: f64,
     /// Resolution of rates \[m/s\]; 0 if they are not rounded.
-    pub rate_step: f64,
+    pub rate_step_m_s: f64,
     /// Standard deviation of lengths \[m\].
-    pub length_noise: f64,
+    pub length_noise_m: f64,
     /// Standard deviation of rates \[m/s\].
-    pub rate_noise: f64,
+    pub rate_noise_m_s: f64,
 }
 
 /// Differences of the machine as built from the machine as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BuildErrors {
     /// Point mass on the platform \[kg\]; negative where the machine lacks what its configuration has.
-    pub payload: f64,
+    pub payload_kg: f64,
     /// Its place, platform axes \[m\].
-    pub payload_at: Vector3<f64>,
+    pub payload_at_m: Vector3<f64>,
     /// Standard deviation of each coordinate of the twelve joint centres \[m\].
-    pub joints: f64,
+    pub joint_deviation_m: f64,
 }
 
 /// External wrench on the platform: `wrench cos(2 pi frequency t)`, t from the start of the plant.
@@ -114,18 +114,18 @@ impl Friction {
     /// The force against `rate`. Its sign is proportional below the speed `smoothing`.
     pub fn force(&self, rate: f64, smoothing: f64) -> f64 {
         let sign = (rate / smoothing).clamp(-1.0, 1.0);
-        let share = rate / self.stribeck_speed;
-        self.viscous * rate + (self.coulomb + self.stiction * (-share * share).exp()) * sign
+        let share = rate / self.stribeck_speed_m_s;
+        self.viscous_n_s_m * rate + (self.coulomb_n + self.stiction_n * (-share * share).exp()) * sign
     }
 
     /// Coulomb friction and stiction together \[N\].
     pub fn dry(&self) -> f64 {
-        self.coulomb + self.stiction
+        self.coulomb_n + self.stiction_n
     }
 
     /// Whether there is any friction.
     pub fn any(&self) -> bool {
-        self.viscous != 0.0 || self.dry() != 0.0
+        self.viscous_n_s_m != 0.0 || self.dry() != 0.0
     }
 }
 
@@ -133,14 +133,14 @@ impl ElasticLeg {
     /// Force \[N\] that pushes drive and rod apart when the drive is `pressed` beyond the leg's length \[m\], at
     /// this rate \[m/s\]. None within the play.
     pub fn force(&self, pressed: f64, rate: f64) -> f64 {
-        let half = 0.5 * self.backlash;
+        let half = 0.5 * self.backlash_m;
         let beyond = pressed - pressed.clamp(-half, half);
-        if beyond == 0.0 { 0.0 } else { self.stiffness * beyond + self.damping * rate }
+        if beyond == 0.0 { 0.0 } else { self.stiffness_n_per_m * beyond + self.damping_n_s_m * rate }
     }
 
     /// How far a drive is pressed beyond the leg's length at rest under this force \[m\].
     pub fn deflection(&self, force: f64) -> f64 {
-        force / self.stiffness + if force == 0.0 { 0.0 } else { (0.5 * self.backlash).copysign(force) }
+        force / self.stiffness_n_per_m + if force == 0.0 { 0.0 } else { (0.5 * self.backlash_m).copysign(force) }
     }
 }
 
@@ -155,7 +155,7 @@ impl ExternalWrench {
 
 impl Default for Friction {
     fn default() -> Self {
-        Self { viscous: 0.0, coulomb: 0.0, stiction: 0.0, stribeck_speed: Self::STRIBECK_SPEED_M_S }
+        Self { viscous_n_s_m: 0.0, coulomb_n: 0.0, stiction_n: 0.0, stribeck_speed_m_s: Self::STRIBECK_SPEED_M_S }
     }
 }
 
@@ -163,10 +163,10 @@ impl BuildErrors {
     /// The machine as built, its joints displaced by random numbers.
     pub fn built(&self, machine: &Machine, random: &mut Random) -> Machine {
         let mut built = machine.clone();
-        if self.payload != 0.0 {
+        if self.payload_kg != 0.0 {
             self.load(&mut built);
         }
-        if self.joints > 0.0 {
+        if self.joint_deviation_m > 0.0 {
             self.displace(&mut built, random);
         }
         built
@@ -175,18 +175,18 @@ impl BuildErrors {
     /// Adds the payload to the platform: common centre of mass, parallel-axis theorem.
     fn load(&self, machine: &mut Machine) {
         let body = &mut machine.platform;
-        let arm = self.payload_at - body.center_of_mass;
-        let mass = body.mass + self.payload;
-        let reduced = body.mass * self.payload / mass;
-        body.center_of_mass += arm * (self.payload / mass);
+        let arm = self.payload_at_m - body.center_of_mass_m;
+        let mass = body.mass_kg + self.payload_kg;
+        let reduced = body.mass_kg * self.payload_kg / mass;
+        body.center_of_mass_m += arm * (self.payload_kg / mass);
         body.inertia -= arm.cross_matrix() * arm.cross_matrix() * reduced;
-        body.mass = mass;
+        body.mass_kg = mass;
     }
 
     fn displace(&self, machine: &mut Machine, random: &mut Random) {
         let joints = &machine.joints;
         let mut displaced = |points: [Vector3<f64>; LEGS]| {
-            points.map(|point| point + Vector3::from_fn(|_, _| self.joints * random.gaussian()))
+            points.map(|point| point + Vector3::from_fn(|_, _| self.joint_deviation_m * random.gaussian()))
         };
         let base = displaced(joints.triples.unpack_vectors(&joints.base));
         let platform = displaced(joints.triples.unpack_vectors(&joints.platform));

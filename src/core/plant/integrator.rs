@@ -23,9 +23,9 @@ pub struct BodyState {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveStates {
     /// \[m\]
-    pub length: Vector6<f64>,
+    pub length_m: Vector6<f64>,
     /// \[m/s\]
-    pub rate: Vector6<f64>,
+    pub rate_m_s: Vector6<f64>,
 }
 
 /// State of the plant: platform and drives.
@@ -43,7 +43,7 @@ pub struct Accelerations {
     /// omega' and v'.
     pub platform: Acceleration,
     /// \[m/s^2\]; zeros where legs are rigid.
-    pub drives: Vector6<f64>,
+    pub drives_m_s2: Vector6<f64>,
 }
 
 /// Time derivative of the state, angular part first.
@@ -71,7 +71,7 @@ pub fn integrate(
         Some(Slope {
             pose: Twist { angular, linear: twist.linear },
             twist: accelerations.platform,
-            drives: DriveStates { length: state.drives.rate, rate: accelerations.drives },
+            drives: DriveStates { length_m: state.drives.rate_m_s, rate_m_s: accelerations.drives_m_s2 },
         })
     };
     let rest =
@@ -85,7 +85,7 @@ pub fn integrate(
     let slope = Slope {
         pose: Twist { angular: mean(|k| k.pose.angular), linear: mean(|k| k.pose.linear) },
         twist: Acceleration { angular: mean(|k| k.twist.angular), linear: mean(|k| k.twist.linear) },
-        drives: DriveStates { length: of_drives(|k| k.drives.length), rate: of_drives(|k| k.drives.rate) },
+        drives: DriveStates { length_m: of_drives(|k| k.drives.length_m), rate_m_s: of_drives(|k| k.drives.rate_m_s) },
     };
     Some(advanced(start, &slope, step))
 }
@@ -103,8 +103,8 @@ fn advanced(start: &PlantState, slope: &Slope, dt: f64) -> PlantState {
             },
         },
         drives: DriveStates {
-            length: drives.length + slope.drives.length * dt,
-            rate: drives.rate + slope.drives.rate * dt,
+            length_m: drives.length_m + slope.drives.length_m * dt,
+            rate_m_s: drives.rate_m_s + slope.drives.rate_m_s * dt,
         },
     }
 }

@@ -33,11 +33,11 @@ pub enum Brakes {
     /// Leg rates at the instant of closing, time since, time until standstill \[s\].
     Closing {
         /// \[m/s\]
-        rates: [f64; LEGS],
+        rates_m_s: [f64; LEGS],
         /// \[s\]
-        elapsed: f64,
+        elapsed_s: f64,
         /// \[s\]
-        duration: f64,
+        duration_s: f64,
     },
     /// The legs are at rest.
     Closed,
@@ -107,7 +107,7 @@ impl Simulator {
             terms,
             state: PlantState {
                 platform: BodyState { pose: home.pose, twist: Twist::default() },
-                drives: DriveStates { length, rate: Vector6::zeros() },
+                drives: DriveStates { length_m: length, rate_m_s: Vector6::zeros() },
             },
             brakes: Brakes::Closed,
             deceleration,
@@ -145,9 +145,9 @@ impl Simulator {
     pub fn leg_motion(&self) -> LegMotion {
         match self.terms.elastic {
             Some(_) => LegMotion {
-                length: self.state.drives.length.into(),
-                rate: self.state.drives.rate.into(),
-                accel: [0.0; LEGS],
+                length_m: self.state.drives.length_m.into(),
+                rate_m_s: self.state.drives.rate_m_s.into(),
+                accel_m_s2: [0.0; LEGS],
             },
             None => legs(self.machine(), &self.state),
         }
@@ -164,12 +164,12 @@ impl Simulator {
             (Brakes::Open, None) => self.close_brakes(),
             _ => {}
         }
-        let steps = (duration / self.terms.step).ceil().clamp(1.0, f64::from(u32::MAX)) as u32;
+        let steps = (duration / self.terms.step_s).ceil().clamp(1.0, f64::from(u32::MAX)) as u32;
         let step = duration / f64::from(steps);
         for _ in 0..steps {
             match (self.brakes, force) {
                 (Brakes::Open, Some(force)) => self.drive(force, step),
-                (Brakes::Closing { rates, elapsed, duration }, _) => {
+                (Brakes::Closing { rates_m_s: rates, elapsed_s: elapsed, duration_s: duration }, _) => {
                     self.brake(&rates, elapsed, duration, step)
                 }
                 _ => {}
@@ -202,17 +202,17 @@ impl Simulator {
         let lengths = leg_lengths(self.machine(), &self.state().pose);
         if let Some(leg) = lengths.iter().position(|length| !self.machine().actuator.contains(*length)) {
             self.state.platform.twist = Twist::default();
-            self.state.drives.rate.fill(0.0);
+            self.state.drives.rate_m_s.fill(0.0);
             self.push = [0.0; LEGS];
             self.brakes = Brakes::EndStop { leg };
         }
     }
 
     fn close_brakes(&mut self) {
-        let rates = legs(self.machine(), &self.state).rate;
+        let rates = legs(self.machine(), &self.state).rate_m_s;
         let duration = Vector6::from(rates).amax() / self.deceleration;
         self.push = [0.0; LEGS];
-        self.brakes = Brakes::Closing { rates, elapsed: 0.0, duration };
+        self.brakes = Brakes::Closing { rates_m_s: rates, elapsed_s: 0.0, duration_s: duration };
     }
 
     /// The legs follow their deceleration; the platform follows the legs (midpoint rule).
@@ -232,7 +232,7 @@ impl Simulator {
         let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
         self.carry_drives(BodyState { pose, twist });
         self.brakes =
-            if standing { Brakes::Closed } else { Brakes::Closing { rates: *rates, elapsed, duration } };
+            if standing { Brakes::Closed } else { Brakes::Closing { rates_m_s: *rates, elapsed_s: elapsed, duration_s: duration } };
     }
 
     /// Moves the platform; drives keep their distance from the legs.
@@ -241,7 +241,7 @@ impl Simulator {
         self.state.platform = platform;
         let after = legs(self.machine(), &self.state);
         let drives = &mut self.state.drives;
-        drives.length += Vector6::from(after.length) - Vector6::from(before.length);
-        drives.rate = after.rate.into();
+        drives.length_m += Vector6::from(after.length_m) - Vector6::from(before.length_m);
+        drives.rate_m_s = after.rate_m_s.into();
     }
 }

@@ -39,11 +39,11 @@ const MAX_STEP_TIMES_RATE: f64 = 1.0;
 #[derive(Clone, Copy, Debug)]
 pub struct PlantTerms {
     /// Rate of the drives' lag \[rad/s\].
-    pub lag: Option<f64>,
+    pub lag_per_s: Option<f64>,
     /// The spring, and the mass of the drive behind it \[kg\].
     pub elastic: Option<(ElasticLeg, f64)>,
     /// Step of the integration \[s\].
-    pub step: f64,
+    pub step_s: f64,
     /// Friction of each leg: where legs are rigid, what the machine does not have; else all of it.
     friction: [Friction; LEGS],
     /// Speed below which the sign of dry friction is proportional \[m/s\].
@@ -63,41 +63,41 @@ impl PlantTerms {
             wanted.friction.dry() + actuator.largest_coulomb_friction() + held_by_load_friction(machine);
         let depends = wanted.drive.bandwidth_hz.is_some() || wanted.leg.is_some() || wanted.friction.any();
         let leg_mass = if depends || dry > 0.0 { least_mass(machine) } else { f64::NAN };
-        let drive_mass = actuator.reflected_mass;
+        let drive_mass = actuator.reflected_mass_kg;
         let mut step = longest_step;
         let mut limit = |rate: f64, effect: f64, divisor: f64| {
             step = step.min((divisor * tolerance / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
         };
 
-        let deflection = |spring: &ElasticLeg| actuator.max_force / spring.stiffness + 0.5 * spring.backlash;
+        let deflection = |spring: &ElasticLeg| actuator.max_force_n / spring.stiffness_n_per_m + 0.5 * spring.backlash_m;
         let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance);
         let mut friction = [wanted.friction; LEGS];
         let mut moved = leg_mass;
         if let Some(spring) = spring {
             let compliance = 1.0 / drive_mass + 1.0 / least_mass(&without_drives(machine));
-            let rate = (spring.stiffness * compliance).sqrt().max(spring.damping * compliance);
+            let rate = (spring.stiffness_n_per_m * compliance).sqrt().max(spring.damping_n_s_m * compliance);
             limit(rate, deflection(&spring), 120.0 / core::f64::consts::TAU);
-            let own = actuator.viscous_friction.iter().zip(&actuator.coulomb_friction);
+            let own = actuator.viscous_friction_n_s_m.iter().zip(&actuator.coulomb_friction_n);
             for (friction, (viscous, coulomb)) in friction.iter_mut().zip(own) {
-                friction.viscous += viscous;
-                friction.coulomb += coulomb;
+                friction.viscous_n_s_m += viscous;
+                friction.coulomb_n += coulomb;
             }
             moved = drive_mass;
         }
-        let way = |rate: f64| actuator.max_force / (moved * rate * rate);
+        let way = |rate: f64| actuator.max_force_n / (moved * rate * rate);
         let lag_rate = wanted.drive.bandwidth_hz.map(|hertz| core::f64::consts::TAU * hertz);
         let lag = lag_rate.filter(|rate| way(*rate) > tolerance);
         if let Some(rate) = lag {
             limit(rate, way(rate), 2880.0);
         }
-        let viscous = friction.iter().map(|friction| friction.viscous).fold(0.0, f64::max);
+        let viscous = friction.iter().map(|friction| friction.viscous_n_s_m).fold(0.0, f64::max);
         if viscous > 0.0 {
             step = step.min(MAX_STEP_TIMES_RATE * moved / viscous);
         }
         Self {
-            lag,
+            lag_per_s: lag,
             elastic: spring.map(|spring| (spring, drive_mass)),
-            step,
+            step_s: step,
             friction,
             // Dry friction acts within smoothing / (force / mass); where that is too fast for the step, its sign
             // is smoothed just enough for a stable integration.
@@ -109,13 +109,13 @@ impl PlantTerms {
     /// The machine whose equations are integrated: with drives that move with their legs, or without.
     pub fn machine(&self, machine: &Machine) -> Machine {
         let mut simulated = machine.clone();
-        simulated.actuator.coulomb_smoothing = self.smoothing;
+        simulated.actuator.coulomb_smoothing_m_s = self.smoothing;
         if self.elastic.is_some() { without_drives(&simulated) } else { simulated }
     }
 
     /// Forces of the drives \[N\], as they know them, a `time` after `command`, from the forces `before` it.
     pub fn push(&self, before: &[f64; LEGS], command: &[f64; LEGS], time: f64) -> [f64; LEGS] {
-        let Some(rate) = self.lag else { return *command };
+        let Some(rate) = self.lag_per_s else { return *command };
         let share = (-rate * time).exp();
         let mut push = *command;
         for (push, before) in push.iter_mut().zip(before) {
@@ -137,9 +137,9 @@ impl PlantTerms {
         let mut force = *push;
         let mut drives_accelerate = Vector6::zeros();
         if let Some((spring, drive_mass)) = self.elastic {
-            let LegMotion { length, rate, .. } = legs(dynamics.machine(), state);
-            force = Transmission::new(actuator, drives.rate.as_ref()).leg_forces(push);
-            let on_drives = drives.length.iter().zip(&drives.rate).zip(&mut drives_accelerate);
+            let LegMotion { length_m: length, rate_m_s: rate, .. } = legs(dynamics.machine(), state);
+            force = Transmission::new(actuator, drives.rate_m_s.as_ref()).leg_forces(push);
+            let on_drives = drives.length_m.iter().zip(&drives.rate_m_s).zip(&mut drives_accelerate);
             let on_rods = force.iter_mut().zip(&self.friction).zip(length.iter().zip(&rate));
             for (((force, friction), (length, rate)), ((drive, drive_rate), accelerates)) in
                 on_rods.zip(on_drives)
@@ -149,7 +149,7 @@ impl PlantTerms {
                 *force = tension;
             }
         } else if actuator.transmits_otherwise() || self.friction.iter().any(Friction::any) {
-            let rates = legs(dynamics.machine(), state).rate;
+            let rates = legs(dynamics.machine(), state).rate_m_s;
             force = Transmission::new(actuator, &rates).leg_forces(push);
             for ((force, friction), rate) in force.iter_mut().zip(&self.friction).zip(rates) {
                 *force -= friction.force(rate, self.smoothing);
@@ -157,7 +157,7 @@ impl PlantTerms {
         }
         let wrench = self.external.at(time);
         let platform = dynamics.acceleration_under(&platform.pose, &platform.twist, &force, &wrench)?;
-        Some(Accelerations { platform, drives: drives_accelerate })
+        Some(Accelerations { platform, drives_m_s2: drives_accelerate })
     }
 }
 
@@ -165,21 +165,21 @@ impl PlantTerms {
 pub(super) fn legs(machine: &Machine, state: &PlantState) -> LegMotion {
     let (pose, twist) = (state.platform.pose, state.platform.twist);
     let motion = Motion { pose, twist, acceleration: Acceleration::default() };
-    LegMotion { accel: [0.0; LEGS], ..leg_motion(machine, &motion) }
+    LegMotion { accel_m_s2: [0.0; LEGS], ..leg_motion(machine, &motion) }
 }
 
 /// Largest load friction of a leg that holds the platform at home \[N\].
 fn held_by_load_friction(machine: &Machine) -> f64 {
     let home = TaskState::at_rest(machine.home).motion();
     let held = inverse_dynamics::<Gravity>(machine, &home).unwrap_or_default();
-    let legs = held.iter().zip(&machine.actuator.load_friction);
+    let legs = held.iter().zip(&machine.actuator.load_friction_share);
     legs.map(|(force, load_friction)| force.abs() * load_friction).fold(0.0, f64::max)
 }
 
 fn without_drives(machine: &Machine) -> Machine {
     let mut bare = machine.clone();
     let actuator = &mut bare.actuator;
-    (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) =
+    (actuator.reflected_mass_kg, actuator.viscous_friction_n_s_m, actuator.coulomb_friction_n) =
         (0.0, [0.0; LEGS], [0.0; LEGS]);
     bare
 }

@@ -212,9 +212,9 @@ impl StatusSource {
             time_to_singularity_s: Some(status.time_to_singularity_s)
                 .filter(|time_s| is_known && time_s.is_finite()),
             legs: legs(snapshot, now_ns, deployment.timeouts.measured_s),
-            stroke_m: [machine.actuator.min_length, machine.actuator.max_length],
+            stroke_m: [machine.actuator.min_length_m, machine.actuator.max_length_m],
             resolution: loaded.config.resolution(),
-            max_force_n: machine.actuator.max_force,
+            max_force_n: machine.actuator.max_force_n,
             sources: self.sources(snapshot, now_ns),
         }
     }
@@ -280,8 +280,8 @@ fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
 fn legs(snapshot: &Snapshot, now_ns: u64, timeout_s: f64) -> Vec<LegReport> {
     let Some(measurement) = &snapshot.measurement else { return vec![] };
     let is_new = snapshot.status.pose_valid == 1 || seconds_since(measurement.time_ns, now_ns) < timeout_s;
-    let rates = measurement.rate.filter(|_| is_new).map_or([None; LEGS], |rate| rate.map(Some));
-    let numbers = measurement.length.iter().zip(rates).zip(&snapshot.force).take(LEGS);
+    let rates = measurement.rate_m_s.filter(|_| is_new).map_or([None; LEGS], |rate| rate.map(Some));
+    let numbers = measurement.length_m.iter().zip(rates).zip(&snapshot.command_n).take(LEGS);
     numbers
         .map(|((length, rate), force)| LegReport { length_m: *length, rate_m_s: rate, force_n: *force })
         .collect()
@@ -322,7 +322,7 @@ mod tests {
         let config = Config::parse(include_str!("../../../config/fried2008.toml"), "a test").unwrap();
         let mut snapshot = Snapshot {
             setpoint: Some(Setpoint::motion(1, TaskState::at_rest([f64::NAN; 6]))),
-            measurement: Some(Measurement { length: [f64::NAN; 6], ..Measurement::default() }),
+            measurement: Some(Measurement { length_m: [f64::NAN; 6], ..Measurement::default() }),
             ..Snapshot::default()
         };
         snapshot.status.pose_valid = 1;

@@ -273,7 +273,7 @@ impl IoThread<'_> {
         let [setpoint_rejection, measured_rejection] = self.inputs.last_rejections();
         self.snapshot = Snapshot {
             status,
-            force: cycle.output.force,
+            command_n: cycle.output.command_n,
             time_ns: monotonic_ns(),
             setpoint: input.setpoint,
             measurement: input.measurement,

@@ -113,7 +113,7 @@ fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u6
     if age_ns > max_force_age_ns && output.state.has_control() {
         let [age_s, bound_s] = [age_ns, max_force_age_ns].map(|time_ns| time_ns as f64 * 1e-9);
         let diagnostic = Diagnostic::new(DiagnosticCode::DaemonHeld, age_s, bound_s);
-        (output.state, output.diagnostic, output.force) = (State::Fault, diagnostic, Output::default().force);
+        (output.state, output.diagnostic, output.command_n) = (State::Fault, diagnostic, Output::default().command_n);
     }
 }
 
@@ -134,7 +134,7 @@ mod tests {
         let mut forces = bus.subscriber::<ForceMessage>(8).unwrap();
         let mut queue = Queue::<u64, 8>::new();
         let (mut delays, _) = queue.split();
-        let output = Output { state: State::Active, force: [5.0; 6], ..Output::default() };
+        let output = Output { state: State::Active, command_n: [5.0; 6], ..Output::default() };
         for (max_force_age_ns, is_valid) in [(u64::MAX, true), (0, false)] {
             let parameters = IoParameters { measured_ns: max_force_age_ns, ..IoParameters::default() };
             let settings = OutputSettings { home: [0.0; 6], parameters };
@@ -151,7 +151,7 @@ mod tests {
     fn a_force_that_was_held_too_long_is_a_fault_with_its_age() {
         for state in State::ALL {
             for (age_ns, is_held) in [(MAX_AGE_NS, false), (MAX_AGE_NS + 1_000_000, true)] {
-                let output = Output { state, force: [5.0; 6], ..Output::default() };
+                let output = Output { state, command_n: [5.0; 6], ..Output::default() };
                 let mut cycle = CycleOutput { due_ns: DUE_NS, output, ..CycleOutput::default() };
                 invalidate_if_held(&mut cycle, DUE_NS + age_ns, MAX_AGE_NS);
                 let expected = if is_held && state.has_control() {

@@ -35,7 +35,7 @@ pub fn run(
         plan => plan?,
     };
     let mut source = job.source(feed, bus, *may_engage)?;
-    source.speed = order.speed;
+    source.speed_share = order.speed_share;
     job.send(MotionEvent::Accepted(format!("{:.2} s to the target", plan.motion.duration_s)));
     drive(job, &mut source, plan, constants, &window(config, order.tolerance_m))
 }
@@ -105,7 +105,7 @@ fn rest(
 ) -> Result<Option<String>, TargetError> {
     let on_path = stream.as_mut().and_then(|stream| stream.slow_down(source.next_ns()));
     let x = on_path.map_or_else(|| source.resting_x(constants), Ok)?;
-    source.speed = 1.0;
+    source.speed_share = 1.0;
     while let Some(task) = stream.as_mut().and_then(|stream| stream.next(source.next_ns())) {
         source.publish_motion(task)?;
     }

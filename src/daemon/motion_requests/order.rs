@@ -55,7 +55,7 @@ pub struct GotoOrder {
     /// Whether the others are taken from the home pose.
     pub home: bool,
     /// Share of the limits of autonomous motions.
-    pub speed: f64,
+    pub speed_share: f64,
     /// Distance at which the platform is in position \[m\]; `None` for the value of the machine file.
     pub tolerance_m: Option<f64>,
 }
@@ -93,7 +93,7 @@ fn goto(line: &RequestLine) -> Result<GotoOrder, String> {
     }
     check("speed", line.speed, SPEED, "send a share of the limits of autonomous motions")?;
     check("tolerance_m", tolerance_m, TOLERANCE_M, "send a distance in m")?;
-    Ok(GotoOrder { target, relative, home, speed: line.speed.unwrap_or(1.0), tolerance_m })
+    Ok(GotoOrder { target, relative, home, speed_share: line.speed.unwrap_or(1.0), tolerance_m })
 }
 
 fn check(field: &str, value: Option<f64>, [low, high]: [f64; 2], remedy: &str) -> Result<(), String> {

@@ -57,11 +57,11 @@ impl GotoPlan {
         let [start, end] = &poses;
         if !is_straight {
             let motion =
-                target_motion(constants, start, end, order.speed, |_, _| go_on()).map_err(refused)?;
+                target_motion(constants, start, end, order.speed_share, |_, _| go_on()).map_err(refused)?;
             return Ok(Self { from, to, motion, stream: None });
         }
         let path = ToolPath::new(coordinates.frames(), start, end);
-        let fastest = ToolMotion::fastest(constants, path, order.speed).map_err(refused)?;
+        let fastest = ToolMotion::fastest(constants, path, order.speed_share).map_err(refused)?;
         let stream = ToolStream::new(config, fastest, go_on)?;
         Ok(Self { from, to, motion: stream.motion().survey(constants), stream: Some(stream) })
     }

@@ -142,8 +142,8 @@ impl Columns {
         let measured = input.measurement.map(|it| {
             let mut message = MeasuredMessage::from(&it);
             // Zeros in the message.
-            message.length_rate_m_s = it.rate.unwrap_or([f64::NAN; 6]);
-            message.force_n = it.drives.force.unwrap_or([f64::NAN; 6]);
+            message.length_rate_m_s = it.rate_m_s.unwrap_or([f64::NAN; 6]);
+            message.force_n = it.drives.force_n.unwrap_or([f64::NAN; 6]);
             message.numbers()
         });
         let status = StatusMessage::new(&origin.home, &output, input.setpoint.as_ref());

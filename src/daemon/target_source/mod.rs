@@ -115,7 +115,7 @@ pub struct TargetSource<'a, F> {
     /// Instant at which the source was opened \[ns\].
     began_ns: u64,
     /// Share of the limits of autonomous motions with which the next targets are approached.
-    pub speed: f64,
+    pub speed_share: f64,
 }
 
 impl<'a, F: Feed> TargetSource<'a, F> {
@@ -142,7 +142,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
             active_since_ns: is_active.then_some(began_ns),
             published: None,
             began_ns,
-            speed: 1.0,
+            speed_share: 1.0,
         })
     }
 
@@ -195,7 +195,7 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     /// Waits for the next instant of the loop and publishes a target. An error if control has ended.
     pub fn publish(&mut self, x: [f64; 6]) -> Result<(), TargetError> {
         let motion = Setpoint::motion(self.tick_ns, TaskState::at_rest(x));
-        self.send(&Setpoint { kind: SetpointKind::Target, target_speed: self.speed, ..motion })
+        self.send(&Setpoint { kind: SetpointKind::Target, target_speed_share: self.speed_share, ..motion })
     }
 
     /// The same with a motion, which is followed as it is.

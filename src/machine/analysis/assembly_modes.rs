@@ -31,10 +31,10 @@ const CONFUSABLE_DISTANCE: f64 = 0.5;
 pub fn permitted_modes(machine: &Machine, lengths: &[f64; LEGS]) -> Modes {
     let home = machine.home_pose();
     let side = KinematicState::new(machine, home).sensitivity().determinant.signum();
-    let mut modes = all_modes(machine, lengths, &home.rotation, machine.max_rotation);
+    let mut modes = all_modes(machine, lengths, &home.rotation, machine.max_rotation_rad);
     modes.poses.retain(|it| {
         let turn = home.displacement_to(it.pose()).angular.norm();
-        turn <= machine.max_rotation && it.sensitivity().determinant * side > 0.0
+        turn <= machine.max_rotation_rad && it.sensitivity().determinant * side > 0.0
     });
     modes
 }
@@ -92,7 +92,7 @@ pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
             beyond_singularity: there.sensitivity().determinant * here.sensitivity().determinant < 0.0,
             is_in_reach,
             is_permitted: there.sensitivity().determinant * here.sensitivity().determinant > 0.0
-                && home.displacement_to(there.pose()).angular.norm() <= machine.max_rotation,
+                && home.displacement_to(there.pose()).angular.norm() <= machine.max_rotation_rad,
         }
     };
     let mut others: Vec<_> = found.iter().map(other).collect();
@@ -105,7 +105,7 @@ pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
 /// singular, because each of them is then the only one with its lengths. Examined are the straight ways of the lengths to
 /// the 64 corners of the stroke, not those in between.
 fn is_confined(machine: &Machine, here: &KinematicState) -> bool {
-    let Actuator { min_length, max_length, .. } = machine.actuator;
+    let Actuator { min_length_m: min_length, max_length_m: max_length, .. } = machine.actuator;
     (0..1_u32 << LEGS).all(|corner| {
         let end = |leg: usize| if corner & (1 << leg) == 0 { min_length } else { max_length };
         let mut tracker = Tracker::new(machine, *here.pose());

@@ -142,7 +142,7 @@ impl<'a> Legs<'a> {
         let mean = platform.column_mean();
         platform.column_iter_mut().for_each(|mut joint| joint -= mean);
         let arms = norms(&platform);
-        let margin = LENGTH_MARGIN_RATIO * joints.radius;
+        let margin = LENGTH_MARGIN_RATIO * joints.radius_m;
         Self { machine, base, platform, arms, mean, lengths: Vector6::from(*lengths), margin }
     }
 
@@ -271,7 +271,7 @@ impl<'a> Legs<'a> {
     /// The pose with these lengths that is found from a start.
     fn solve(&self, start: Pose) -> Option<KinematicState> {
         let Self { machine, lengths, .. } = *self;
-        let radius = machine.joints.radius;
+        let radius = machine.joints.radius_m;
         let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
         let residual = |pose: &Pose| lengths - Vector6::from(leg_lengths(machine, pose));
         let (mut pose, mut rest) = (start, residual(&start));

@@ -102,7 +102,7 @@ impl<'a> Clearance<'a> {
             dynamics: InverseDynamics::new(machine),
             force_changes: ForceChangeBounds::new(machine),
             largest_condition,
-            arms: platform.map(|arm| (arm.norm(), (arm - mean).norm() / joints.radius)),
+            arms: platform.map(|arm| (arm.norm(), (arm - mean).norm() / joints.radius_m)),
             joints: platform,
             mean,
         }
@@ -115,8 +115,8 @@ impl<'a> Clearance<'a> {
         let actuator = &self.machine.actuator;
         let ends = |(leg, length): (usize, f64)| {
             [
-                (length - actuator.min_length, WorkspaceLimit::LegTooShort(leg)),
-                (actuator.max_length - length, WorkspaceLimit::LegTooLong(leg)),
+                (length - actuator.min_length_m, WorkspaceLimit::LegTooShort(leg)),
+                (actuator.max_length_m - length, WorkspaceLimit::LegTooLong(leg)),
             ]
         };
         let lengths = leg_lengths(self.machine, &self.pose(shape, &cell.middle));
@@ -161,10 +161,10 @@ impl<'a> Clearance<'a> {
         let kinematic_state = KinematicState::new(self.machine, *pose);
         let actuator = &self.machine.actuator;
         for (leg, length) in kinematic_state.lengths(self.machine).into_iter().enumerate() {
-            if !(length >= actuator.min_length) {
+            if !(length >= actuator.min_length_m) {
                 return Some(WorkspaceLimit::LegTooShort(leg));
             }
-            if !(length <= actuator.max_length) {
+            if !(length <= actuator.max_length_m) {
                 return Some(WorkspaceLimit::LegTooLong(leg));
             }
         }
@@ -200,7 +200,7 @@ impl<'a> Clearance<'a> {
         );
         let wrench = at_rest.wrench + change * (norm + axial_norm);
         middle.universal_sine - turned_leg >= self.least_universal_sine
-            && largest + middle.largest_row / left * wrench + at_rest.axial <= self.holding_force()
+            && largest + middle.largest_row_norm / left * wrench + at_rest.axial_n <= self.holding_force()
     }
 
     /// Lower bound of [`Clearance::margin`] anywhere in a cell.
@@ -225,7 +225,7 @@ impl<'a> Clearance<'a> {
                 }
                 let bent = 0.5 * arm * turns_squared;
                 let longest = length + linear + 0.5 * moved * moved / shortest + bent;
-                (length - linear - bent - actuator.min_length).min(actuator.max_length - longest)
+                (length - linear - bent - actuator.min_length_m).min(actuator.max_length_m - longest)
             });
         margins.fold(f64::INFINITY, f64::min)
     }
@@ -293,7 +293,7 @@ impl<'a> Clearance<'a> {
                 let moved = shift + turn.cross(&arm);
                 let turned = (moved - direction * direction.dot(&moved)) / length;
                 let moment = turn.cross(&from_mean).cross(&direction) + from_mean.cross(&turned);
-                column.fixed_rows_mut::<3>(0).copy_from(&(moment / joints.radius));
+                column.fixed_rows_mut::<3>(0).copy_from(&(moment / joints.radius_m));
                 column.fixed_rows_mut::<3>(3).copy_from(&turned);
             }
             sum += (inverse * derivative).norm() * half;

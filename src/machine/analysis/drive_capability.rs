@@ -64,7 +64,7 @@ impl DriveCapability {
             (a.component_mul(a) + b.component_mul(b) + c.component_mul(c)).map(f64::sqrt).into()
         };
         let mut loads = [LegLoad::default(); LEGS];
-        let holding = found.holding(machine).into_iter().zip(&machine.actuator.coulomb_friction);
+        let holding = found.holding(machine).into_iter().zip(&machine.actuator.coulomb_friction_n);
         for (load, (force, friction)) in loads.iter_mut().zip(holding) {
             load.holding = force.abs() + friction;
         }
@@ -74,7 +74,7 @@ impl DriveCapability {
         }
         let wrenches = leg_wrenches(machine, pose);
         let arms = wrenches.column_iter().map(|wrench| wrench.fixed_rows::<3>(0).norm());
-        Some(Self { loads, largest_arm: arms.fold(0.0, f64::max), max_rate: machine.actuator.max_rate })
+        Some(Self { loads, largest_arm: arms.fold(0.0, f64::max), max_rate: machine.actuator.max_rate_m_s })
     }
 
     /// The leg that needs the largest force at rest, counted from 0, and that force \[N\].

@@ -36,7 +36,7 @@ pub struct MeasuredMotion {
     /// Instant of the measurement, on the clock of the releases \[ns\].
     pub time_ns: u64,
     /// \[m\]
-    pub length: [f64; LEGS],
+    pub length_m: [f64; LEGS],
     /// By forward kinematics.
     pub pose: Pose,
     /// Reference of the cycle; its instant may be another one, as long as the difference is constant.
@@ -103,7 +103,7 @@ type Terms = SVector<f64, TERMS>;
 /// Delay of the drives of a machine from a recorded motion; `None` if too little was recorded, or it does not move enough.
 pub fn drive_delay(machine: &Machine, stretches: &[RecordedStretch]) -> Option<DriveDelay> {
     let mut frictionless = machine.clone();
-    (frictionless.actuator.coulomb_friction, frictionless.actuator.viscous_friction) =
+    (frictionless.actuator.coulomb_friction_n, frictionless.actuator.viscous_friction_n_s_m) =
         ([0.0; LEGS], [0.0; LEGS]);
     let model = InverseDynamics::new(&frictionless);
     let recorded: Vec<_> = stretches.iter().map(|stretch| Instants::new(&model, stretch)).collect();
@@ -189,14 +189,14 @@ impl Instants {
 impl Instant {
     fn new(model: &InverseDynamics, times: [f64; 3], samples: [&MeasuredMotion; 3]) -> Option<Self> {
         let machine = model.machine();
-        let length = samples.map(|sample| Vector6::from(sample.length));
+        let length = samples.map(|sample| Vector6::from(sample.length_m));
         let [first, middle, last] = samples;
         let (rate, second) = differences(&times, &length);
         let kinematics = KinematicState::new(machine, middle.pose);
         let twist = kinematics.twist(machine, &rate.into())?;
         // L'' = N^T X'' + what the velocity alone gives.
         let coasting = Motion { pose: middle.pose, twist, acceleration: Acceleration::default() };
-        let by_velocity = Vector6::from(leg_motion(machine, &coasting).accel);
+        let by_velocity = Vector6::from(leg_motion(machine, &coasting).accel_m_s2);
         let acceleration = kinematics.twist(machine, &(second - by_velocity).into())?.vector();
         let motion = Motion { acceleration: Acceleration::from_vector(&acceleration), ..coasting };
         let force = |sample: &MeasuredMotion| model.forces::<Exact>(&sample.reference).map(Vector6::from);
@@ -204,7 +204,7 @@ impl Instant {
         let modelled = model.forces::<Exact>(&motion)?.into();
         let mut instruments = terms(machine, &middle.reference, (&force(middle)?, &force_rate))?;
         // A leg that nearly stands has stiction, which would pass for a delay.
-        let standing = STANDING_M_S.min(STANDING_RATIO * machine.actuator.max_rate);
+        let standing = STANDING_M_S.min(STANDING_RATIO * machine.actuator.max_rate_m_s);
         for (instruments, rate) in instruments.iter_mut().zip(&rate) {
             if rate.abs() < standing {
                 *instruments = Terms::zeros();
@@ -222,7 +222,7 @@ fn terms(
     (force, force_rate): (&Vector6<f64>, &Vector6<f64>),
 ) -> Option<[Terms; LEGS]> {
     let regressor = regressor(machine, motion)?;
-    let rates = Vector6::from(leg_motion(machine, motion).rate);
+    let rates = Vector6::from(leg_motion(machine, motion).rate_m_s);
     Some(core::array::from_fn(|leg| {
         let (mut terms, rate) = (Terms::zeros(), value(&rates, leg));
         terms.fixed_rows_mut::<COMMON>(0).copy_from(&regressor.fixed_view::<1, COMMON>(leg, 0).transpose());

@@ -127,14 +127,14 @@ fn about_home(machine: &Machine, displacement: &TaskState) -> TaskState {
 /// Independent coefficients of mean square 1, angles in radians and positions in radii of the joints.
 fn random_series(machine: &Machine, random: &mut Random) -> FourierSeries {
     let mut coefficients = Coefficients::from_fn(|_, _| random.gaussian());
-    coefficients.fixed_rows_mut::<3>(3).scale_mut(machine.joints.radius);
+    coefficients.fixed_rows_mut::<3>(3).scale_mut(machine.joints.radius_m);
     FourierSeries(coefficients)
 }
 
 /// Parameters of which only the sum has an effect.
 fn pairs(machine: &Machine) -> impl Iterator<Item = [usize; 2]> {
     let [cylinder, rod] =
-        [&machine.cylinder, &machine.rod].map(|link| link.transverse_inertia.reference_length);
+        [&machine.cylinder, &machine.rod].map(|link| link.transverse_inertia.reference_length_m);
     INDISTINGUISHABLE_PAIRS.into_iter().chain((cylinder == rod).then_some(QUADRATIC))
 }
 

@@ -41,11 +41,11 @@ pub struct FidelityError {
     /// The fidelity.
     pub fidelity: Fidelity,
     /// Mean over the even spread, or over the rows \[N\].
-    pub mean: f64,
+    pub mean_n: f64,
     /// Root mean square over the same \[N\].
-    pub rms: f64,
+    pub rms_n: f64,
     /// Largest over all points \[N\].
-    pub max: f64,
+    pub max_n: f64,
     /// The largest error as a share of the peak force, as the head of this file says.
     pub share: f64,
 }
@@ -72,7 +72,7 @@ impl FidelityComparison {
             let sample = FidelitySample::take(model, &envelope.at(point));
             statistics.add(&sample);
             if let Ok(sample) = sample {
-                let errors = sample.errors.as_flattened();
+                let errors = sample.errors_n.as_flattened();
                 worst
                     .as_flattened_mut()
                     .iter_mut()
@@ -90,16 +90,16 @@ impl FidelityComparison {
             evaluate(&envelope.corner(k), &mut edge, &mut worst);
         }
         let mut all = inside.and(&edge);
-        let mut peak = all.peak;
+        let mut peak = all.peak_n;
         for (fidelity, (errors, worst)) in Fidelity::ALL.into_iter().zip(all.errors.iter_mut().zip(&worst)) {
             for (leg, start) in worst.iter().enumerate() {
                 let top = ascend(model, envelope, fidelity, leg, start);
-                errors.max = errors.max.max(top.error);
+                errors.max_n = errors.max_n.max(top.error);
                 let forces = model.forces::<Exact>(&envelope.at(&top.point).motion());
                 peak = peak.max(forces.map_or(0.0, |forces| largest(&forces)));
             }
         }
-        all.peak = peak;
+        all.peak_n = peak;
         Self::new(&[inside, edge], all)
     }
 
@@ -111,17 +111,17 @@ impl FidelityComparison {
     /// The first part is the inside.
     fn new(parts: &[ErrorStatistics], all: ErrorStatistics) -> Self {
         let inside = parts.first().copied().unwrap_or_default();
-        let nothing = FidelityError { fidelity: Fidelity::Exact, mean: 0.0, rms: 0.0, max: 0.0, share: 0.0 };
+        let nothing = FidelityError { fidelity: Fidelity::Exact, mean_n: 0.0, rms_n: 0.0, max_n: 0.0, share: 0.0 };
         let mut errors = [nothing; FIDELITY_COUNT];
         for (number, (error, fidelity)) in errors.iter_mut().zip(Fidelity::ALL).enumerate() {
             let errors =
                 |statistics: &ErrorStatistics| statistics.errors.get(number).copied().unwrap_or_default();
-            let share = |statistics: &ErrorStatistics| share(errors(statistics).max, statistics.peak);
+            let share = |statistics: &ErrorStatistics| share(errors(statistics).max_n, statistics.peak_n);
             *error = FidelityError {
                 fidelity,
-                mean: inside.mean(&errors(&inside)),
-                rms: inside.rms(&errors(&inside)),
-                max: errors(&all).max,
+                mean_n: inside.mean(&errors(&inside)),
+                rms_n: inside.rms(&errors(&inside)),
+                max_n: errors(&all).max_n,
                 share: parts.iter().map(share).fold(share(&all), f64::max),
             };
         }

@@ -16,9 +16,9 @@ pub const FIDELITY_COUNT: usize = Fidelity::ALL.len();
 #[derive(Clone, Copy, Debug)]
 pub struct FidelitySample {
     /// Largest exact force \[N\].
-    pub peak: f64,
+    pub peak_n: f64,
     /// Error of each fidelity and leg \[N\], in the order of [`Fidelity::ALL`].
-    pub errors: [[f64; LEGS]; FIDELITY_COUNT],
+    pub errors_n: [[f64; LEGS]; FIDELITY_COUNT],
 }
 
 /// Reason why a motion has no sample.
@@ -46,7 +46,7 @@ impl FidelitySample {
                 *error = (force - exact).abs();
             }
         }
-        Ok(Self { peak: largest(&exact), errors })
+        Ok(Self { peak_n: largest(&exact), errors_n: errors })
     }
 }
 
@@ -56,7 +56,7 @@ pub struct ErrorSums {
     sum: f64,
     squares: f64,
     /// Largest \[N\].
-    pub max: f64,
+    pub max_n: f64,
 }
 
 /// Error statistics of all fidelities over many motions.
@@ -69,7 +69,7 @@ pub struct ErrorStatistics {
     /// Motions at a singular pose.
     pub singular: u64,
     /// Largest exact force \[N\].
-    pub peak: f64,
+    pub peak_n: f64,
     /// In the order of [`Fidelity::ALL`].
     pub errors: [ErrorSums; FIDELITY_COUNT],
 }
@@ -83,11 +83,11 @@ impl ErrorStatistics {
             Err(NotEvaluated::Singular) => return self.singular += 1,
         };
         self.evaluated += 1;
-        self.peak = self.peak.max(sample.peak);
-        for (sums, errors) in self.errors.iter_mut().zip(&sample.errors) {
+        self.peak_n = self.peak_n.max(sample.peak_n);
+        for (sums, errors) in self.errors.iter_mut().zip(&sample.errors_n) {
             sums.sum += errors.iter().sum::<f64>();
             sums.squares += errors.iter().map(|error| error * error).sum::<f64>();
-            sums.max = sums.max.max(largest(errors));
+            sums.max_n = sums.max_n.max(largest(errors));
         }
     }
 
@@ -110,9 +110,9 @@ impl ErrorStatistics {
         self.evaluated += other.evaluated;
         self.outside += other.outside;
         self.singular += other.singular;
-        self.peak = self.peak.max(other.peak);
+        self.peak_n = self.peak_n.max(other.peak_n);
         for (a, b) in self.errors.iter_mut().zip(&other.errors) {
-            *a = ErrorSums { sum: a.sum + b.sum, squares: a.squares + b.squares, max: a.max.max(b.max) };
+            *a = ErrorSums { sum: a.sum + b.sum, squares: a.squares + b.squares, max_n: a.max_n.max(b.max_n) };
         }
         self
     }

@@ -10,7 +10,7 @@ pub struct SentForce {
     /// \[ns\]
     pub release_ns: u64,
     /// \[N\]
-    pub force: [f64; LEGS],
+    pub force_n: [f64; LEGS],
 }
 
 /// First and second derivative by divided differences: the first at the middle, the second as the mean over the triangle.
@@ -47,7 +47,7 @@ pub(super) struct ForceIntegrals(Vec<HeldForce>);
 impl ForceIntegrals {
     pub fn new(sent: &[SentForce], zero_ns: u64) -> Self {
         let mut held: Vec<HeldForce> = vec![];
-        for SentForce { release_ns, force } in sent {
+        for SentForce { release_ns, force_n: force } in sent {
             let begin = (release_ns - zero_ns) as f64 * 1e-9;
             let [first, second] = held.last().map_or([Vector6::zeros(); 2], |last| last.at(begin));
             held.push(HeldForce { begin, force: (*force).into(), first, second });

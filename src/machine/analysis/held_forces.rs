@@ -56,7 +56,7 @@ pub struct SurveyedPose {
     /// Condition of the pose.
     pub condition: f64,
     /// Pole under held forces \[1/s\].
-    pub pole: f64,
+    pub pole_per_s: f64,
 }
 
 impl HeldForces {
@@ -91,7 +91,7 @@ impl HeldForces {
             // The largest norm is in a corner of the rates.
             let corners = (0..1_u32 << LEGS).map(|signs| {
                 let sign = |leg: usize| if signs >> leg & 1 == 1 { 1.0 } else { -1.0 };
-                let jerk = by_rates * Vector6::from_fn(|leg, _| sign(leg) * machine.actuator.max_rate);
+                let jerk = by_rates * Vector6::from_fn(|leg, _| sign(leg) * machine.actuator.max_rate_m_s);
                 jerk.fixed_rows::<3>(row).norm()
             });
             by_limits.min(corners.fold(0.0, f64::max))
@@ -102,7 +102,7 @@ impl HeldForces {
     fn growth(&self, pose: &Pose) -> Option<Matrix6<f64>> {
         let forces = leg_wrenches(self.model.machine(), pose).lu().solve(&self.load(pose))?;
         let unbalanced = |pose: &Pose| leg_wrenches(self.model.machine(), pose) * forces - self.load(pose);
-        let radius = self.model.machine().joints.radius;
+        let radius = self.model.machine().joints.radius_m;
         let mut stiffness = Matrix6::zeros();
         for (axis, mut column) in stiffness.column_iter_mut().enumerate() {
             let step = if axis < 3 { STEP } else { STEP * radius };
@@ -137,7 +137,7 @@ impl HeldForces {
         for direction in (0..DIRECTIONS).map(direction) {
             let at = |way: f64| {
                 let mut displacement = direction * way;
-                displacement.fixed_rows_mut::<3>(3).scale_mut(machine.joints.radius);
+                displacement.fixed_rows_mut::<3>(3).scale_mut(machine.joints.radius_m);
                 home.displaced(&Twist::from_vector(&displacement))
             };
             let (mut way, mut step, mut recorded) = (0.0, SURVEY_STEP, 0.0);
@@ -162,7 +162,7 @@ impl HeldForces {
         if condition <= least_condition {
             return None;
         }
-        found.push(SurveyedPose { pose: *pose, condition, pole: self.pole(pose)? });
+        found.push(SurveyedPose { pose: *pose, condition, pole_per_s: self.pole(pose)? });
         Some(condition)
     }
 }

@@ -54,7 +54,7 @@ pub fn leg_crossings(machine: &Machine, pose: &Pose) -> Vec<LegCrossing> {
         .iter()
         .enumerate()
         .flat_map(|(k, first)| legs.iter().skip(k + 1).map(move |second| (first, second)));
-    let least = MEETING_SHARE * joints.radius;
+    let least = MEETING_SHARE * joints.radius_m;
     pairs.filter_map(|((i, (a, b)), (j, (c, d)))| examine([*i, *j], [[a, b], [c, d]], least)).collect()
 }
 

@@ -82,7 +82,7 @@ impl OtherPoseSearch {
 
 /// Poses along an axis that are worth their time, relative to a machine with the usual rotation.
 pub fn search_density(machine: &Machine) -> f64 {
-    (USUAL_ROTATION_RAD / machine.max_rotation).min(1.0)
+    (USUAL_ROTATION_RAD / machine.max_rotation_rad).min(1.0)
 }
 
 fn nearest(found: impl Iterator<Item = PoseDistance>) -> Option<PoseDistance> {
@@ -104,8 +104,8 @@ fn rest_poses(machine: &Machine, clearance: &Clearance, count: usize) -> Vec<Pos
     let home = machine.home_pose();
     let pose = |(turn, shift): (Vector3<f64>, Vector3<f64>)| {
         // Small rotations are as frequent as large ones.
-        let angular = turn * (machine.max_rotation * turn.norm_squared());
-        home.displaced(&Twist { angular, linear: shift * machine.joints.radius })
+        let angular = turn * (machine.max_rotation_rad * turn.norm_squared());
+        home.displaced(&Twist { angular, linear: shift * machine.joints.radius_m })
     };
     let is_usable = |at: (Vector3<f64>, _)| at.0.norm() <= 1.0 && clearance.violation_at(&pose(at)).is_none();
     let (mut random, mut here) = (Random::new(1), (Vector3::zeros(), Vector3::zeros()));

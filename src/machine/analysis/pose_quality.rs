@@ -43,9 +43,9 @@ const PAYLOAD_TOLERANCE: f64 = 1e-12;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AccelerationDemand {
     /// Largest `|v'|` of C \[m/s^2\].
-    pub linear: f64,
+    pub linear_m_s2: f64,
     /// Largest `|omega'|` \[rad/s^2\].
-    pub angular: f64,
+    pub angular_rad_s2: f64,
 }
 
 /// Evaluator of the quality of poses of one machine.
@@ -73,22 +73,22 @@ pub struct PoseEvaluator {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseQuality {
     /// Smallest distance of a leg from an end of its stroke; negative outside of it \[m\].
-    pub stroke_margin: f64,
+    pub stroke_margin_m: f64,
     /// `det N / radius^3`, positive on home's side of singular poses.
     pub determinant: f64,
     /// As [`hexad_core::model::sensitivity::Sensitivity::condition`].
     pub condition: f64,
     /// The largest force of any leg under the demanded accelerations; infinite at a singular pose \[N\].
-    pub worst_force: f64,
+    pub worst_force_n: f64,
     /// The largest point mass at the platform's centre of mass that the actuators can hold as every target must be held, and that leaves
     /// every force within their limit under the demanded accelerations; 0 if it is exceeded without payload, infinite without gravity and acceleration \[kg\].
-    pub payload: f64,
+    pub payload_kg: f64,
 }
 
 impl PoseQuality {
     /// Whether every leg is within its stroke and the pose on home's side of singular poses.
     pub fn within_reach(&self) -> bool {
-        self.stroke_margin >= 0.0 && self.determinant > 0.0
+        self.stroke_margin_m >= 0.0 && self.determinant > 0.0
     }
 }
 
@@ -118,15 +118,15 @@ impl PoseEvaluator {
                 .fold(f64::INFINITY, f64::min)
         };
         PoseQuality {
-            stroke_margin: kinematic_state
+            stroke_margin_m: kinematic_state
                 .lengths(machine)
                 .map(|length| machine.actuator.margin(length))
                 .into_iter()
                 .fold(f64::INFINITY, f64::min),
             determinant: self.home_sign * sensitivity.determinant,
             condition: sensitivity.condition,
-            worst_force: legs.map_or(f64::INFINITY, worst),
-            payload: legs.map_or(0.0, payload),
+            worst_force_n: legs.map_or(f64::INFINITY, worst),
+            payload_kg: legs.map_or(0.0, payload),
         }
     }
 
@@ -134,10 +134,10 @@ impl PoseEvaluator {
     fn leg_forces(&self, pose: &Pose) -> Option<[LegForceBound; LEGS]> {
         let machine = self.model.machine();
         let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
-        let arm = pose.rotation * machine.platform.center_of_mass;
+        let arm = pose.rotation * machine.platform.center_of_mass_m;
         let tilde = arm.cross_matrix();
         let weight =
-            Vector6::from_iterator(arm.cross(&machine.gravity).iter().chain(&machine.gravity).copied());
+            Vector6::from_iterator(arm.cross(&machine.gravity_m_s2).iter().chain(&machine.gravity_m_s2).copied());
         let mut mass = Matrix6::zeros();
         for (row, column, block) in
             [(0, 0, -tilde * tilde), (0, 3, tilde), (3, 0, -tilde), (3, 3, Matrix3::identity())]
@@ -152,14 +152,14 @@ impl PoseEvaluator {
             matrix.fixed_view::<1, 3>(leg, first).into()
         };
         let mut legs = [LegForceBound::default(); LEGS];
-        let rest = still.iter().zip(&still_mass).zip(machine.actuator.coulomb_friction);
+        let rest = still.iter().zip(&still_mass).zip(machine.actuator.coulomb_friction_n);
         for (i, (leg, ((own, added), friction))) in legs.iter_mut().zip(rest).enumerate() {
             let pair = |first| [row(&of_machine, i, first), row(&of_mass, i, first)];
             *leg = LegForceBound {
                 friction,
                 still: [*own, *added],
-                angular: pair(0).map(|row| row * self.demand.angular),
-                linear: pair(3).map(|row| row * self.demand.linear),
+                angular: pair(0).map(|row| row * self.demand.angular_rad_s2),
+                linear: pair(3).map(|row| row * self.demand.linear_m_s2),
             };
         }
         Some(legs)

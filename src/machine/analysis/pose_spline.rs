@@ -20,7 +20,7 @@ type Derivatives = SMatrix<f64, 2, 6>;
 /// Sets X' and X'' of knots whose times increase strictly. `None` if their steps are too unequal for the numbers' digits.
 pub fn complete(knots: &mut [Knot]) -> Option<()> {
     // In units of the mean step, so that all numbers are of one size.
-    let (first, last) = (knots.first()?.t, knots.last()?.t);
+    let (first, last) = (knots.first()?.t_s, knots.last()?.t_s);
     let unit_s = if knots.len() > 1 { (last - first) / (knots.len() - 1) as f64 } else { 1.0 };
     // Elimination: derivatives of a knot = known - gain * those of the next.
     let mut eliminated = Vec::with_capacity(knots.len());
@@ -28,7 +28,7 @@ pub fn complete(knots: &mut [Knot]) -> Option<()> {
     eliminated.push((gain, known));
     for window in knots.windows(3) {
         let [before, knot, after] = window else { continue };
-        let (p, q) = ((knot.t - before.t) / unit_s, (after.t - knot.t) / unit_s);
+        let (p, q) = ((knot.t_s - before.t_s) / unit_s, (after.t_s - knot.t_s) / unit_s);
         let lower = Matrix2::new(-24.0 / (p * p), -3.0 / p, -168.0 / (p * p * p), -24.0 / (p * p));
         let middle = Matrix2::new(
             36.0 / (q * q) - 36.0 / (p * p),
@@ -74,10 +74,10 @@ mod tests {
         let exact = |t: f64| {
             let profile = rise(t, 2.0);
             let way = Vector6::new(0.1, -0.2, 0.3, 1.0, -2.0, 0.5);
-            TaskState { x: way * profile.value, xd: way * profile.rate, xdd: way * profile.accel }
+            TaskState { x: way * profile.value_share, xd: way * profile.rate_per_s, xdd: way * profile.accel_per_s2 }
         };
         let mut knots = [0.0, 0.1, 0.7, 0.75, 1.2, 1.9, 2.0]
-            .map(|t| Knot { t, state: TaskState::at_rest(exact(t).x.into()) });
+            .map(|t| Knot { t_s: t, state: TaskState::at_rest(exact(t).x.into()) });
         complete(&mut knots).unwrap();
         for k in 0..=40 {
             let t = 0.05 * f64::from(k);
@@ -96,21 +96,21 @@ mod tests {
             let window = hexad_core::motion::minimum_jerk::window(t, 8.0, 2.0);
             let (s, c) = (3.0 * t).sin_cos();
             [
-                window.value * s,
-                window.rate * s + 3.0 * window.value * c,
-                window.accel * s + 6.0 * window.rate * c - 9.0 * window.value * s,
+                window.value_share * s,
+                window.rate_per_s * s + 3.0 * window.value_share * c,
+                window.accel_per_s2 * s + 6.0 * window.rate_per_s * c - 9.0 * window.value_share * s,
             ]
         };
         let mut knots: Vec<_> = (0..count)
             .map(|k| {
                 let t = h * f64::from(k);
-                Knot { t, state: TaskState::at_rest([exact(t)[0]; 6]) }
+                Knot { t_s: t, state: TaskState::at_rest([exact(t)[0]; 6]) }
             })
             .collect();
         complete(&mut knots).unwrap();
         let mut worst = [0.0_f64; 2];
         for knot in &knots {
-            let [_, rate, accel] = exact(knot.t);
+            let [_, rate, accel] = exact(knot.t_s);
             worst[0] = worst[0].max((knot.state.xd[0] - rate).abs());
             worst[1] = worst[1].max((knot.state.xdd[0] - accel).abs());
         }
@@ -121,7 +121,7 @@ mod tests {
     fn one_and_two_poses_are_at_rest() {
         for count in [1, 2] {
             let mut knots: Vec<_> = (0..count)
-                .map(|k| Knot { t: f64::from(k), state: TaskState::at_rest([f64::from(k); 6]) })
+                .map(|k| Knot { t_s: f64::from(k), state: TaskState::at_rest([f64::from(k); 6]) })
                 .collect();
             complete(&mut knots).unwrap();
             assert!(knots.iter().all(|knot| knot.state.xd.amax() == 0.0 && knot.state.xdd.amax() == 0.0));

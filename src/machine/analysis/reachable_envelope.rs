@@ -54,7 +54,7 @@ pub fn reachable_envelope(model: &InverseDynamics) -> MotionEnvelope {
 
 /// Bounds of the box before it shrinks, at rest.
 pub fn nominal_bounds(machine: &Machine) -> EnvelopeBounds {
-    let p = POSITION_OVER_RADIUS * machine.joints.radius;
+    let p = POSITION_OVER_RADIUS * machine.joints.radius_m;
     let half = [ANGLE_RAD, ANGLE_RAD, ANGLE_RAD, p, p, p];
     EnvelopeBounds { pose_min: half.map(|a| -a), pose_max: half, velocity: [0.0; 6], acceleration: [0.0; 6] }
 }
@@ -83,6 +83,6 @@ fn has_reserve(model: &InverseDynamics, state: &TaskState) -> bool {
     let actuator = &model.machine().actuator;
     let motion = state.motion();
     let within = |values: &[f64], limit: f64| values.iter().all(|x| x.abs() <= USABLE_SHARE * limit);
-    within(&leg_motion(model.machine(), &motion).rate, actuator.max_rate)
+    within(&leg_motion(model.machine(), &motion).rate_m_s, actuator.max_rate_m_s)
         && model.forces::<Exact>(&motion).is_some_and(|force| within(&force, actuator.available_force()))
 }

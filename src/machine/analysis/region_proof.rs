@@ -69,7 +69,7 @@ pub fn prove(machine: &Machine, clearance: &Clearance, bounds: &EnvelopeBounds) 
         if let Some((_, limit)) = clearance.violation(&shape, &cell) {
             return RegionProof::Violated(cell.middle, limit);
         }
-        queue.extend(cell.halves(machine.joints.radius));
+        queue.extend(cell.halves(machine.joints.radius_m));
     }
     RegionProof::Clear
 }

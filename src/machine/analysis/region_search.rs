@@ -49,7 +49,7 @@ pub fn largest_region(
     shape: &RegionShape,
     bar: &ProgressBar,
 ) -> RegionBounds {
-    let arm = machine.joints.radius;
+    let arm = machine.joints.radius_m;
     let violation = |cell: &PoseCell| clearance.violation(shape, cell);
     let start = first_violation(clearance, shape);
     let RegionShape::Ball { .. } = shape else {

@@ -15,7 +15,7 @@ pub enum RegionShape {
     /// most a quarter. The angles turn home's platform.
     Ball {
         /// \[rad\]
-        turn: f64,
+        turn_rad: f64,
     },
     /// Offsets of X from home within ranges (low at most 0, high at least 0) times the size.
     Box {
@@ -39,7 +39,7 @@ impl RegionShape {
     /// The cell that contains the region of a size.
     pub fn cell(&self, size: f64) -> PoseCell {
         let (low, high) = match *self {
-            Self::Ball { turn: t } => ([-t, -t, -t, -size, -size, -size], [t, t, t, size, size, size]),
+            Self::Ball { turn_rad: t } => ([-t, -t, -t, -size, -size, -size], [t, t, t, size, size, size]),
             Self::Box { low, high } => (low.map(|x| size * x), high.map(|x| size * x)),
         };
         let mut cell = PoseCell { middle: [0.0; 6], half: [0.0; 6] };
@@ -55,7 +55,7 @@ impl RegionShape {
     pub fn size(&self, cell: &PoseCell) -> Option<f64> {
         let nearest = cell.nearest();
         match self {
-            Self::Ball { turn } => {
+            Self::Ball { turn_rad: turn } => {
                 let [a, b, c, ..] = cell.middle;
                 let middle = log(&turned([a, b, c])).norm();
                 // 1e-12 for rounding, so that a cell on the edge is not left out.
@@ -77,7 +77,7 @@ impl RegionShape {
     /// Parameters on the edge of the region of size 1, angles included, from six numbers in \[-1, 1\].
     pub fn edge(&self, numbers: &[f64; 6]) -> [f64; 6] {
         match self {
-            Self::Ball { turn } => {
+            Self::Ball { turn_rad: turn } => {
                 let [a, b, c, x, y, z] = *numbers;
                 let unit = |v: Vector3<f64>| v.try_normalize(0.0).unwrap_or_else(Vector3::x);
                 let rotation = exp(&(unit(Vector3::new(a, b, c)) * *turn));

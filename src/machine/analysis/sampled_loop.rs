@@ -53,17 +53,17 @@ pub struct SampledLoop {
     /// Bandwidth of the estimator over the natural frequency, `we / wn`.
     pub estimator_ratio: f64,
     /// Noise of a reading of the rate, times the period, over that of a length; `None` if rates are not used.
-    pub rate_noise: Option<f64>,
+    pub rate_noise_ratio: Option<f64>,
     /// Whether the estimated disturbance is compensated.
     pub compensates_disturbance: bool,
     /// Part of the delay over which the estimator predicts, in periods.
-    pub known_delay: f64,
+    pub known_delay_periods: f64,
     /// Delay from the measurement to its force, in periods.
-    pub delay: f64,
+    pub delay_periods: f64,
     /// Mass of the platform over that of the model.
     pub mass_ratio: f64,
     /// Open-loop pole of the platform under held forces, times the period: see [`held_forces`](super::held_forces).
-    pub held_pole: f64,
+    pub held_pole_t: f64,
 }
 
 impl Default for SampledLoop {
@@ -73,12 +73,12 @@ impl Default for SampledLoop {
             wn_t: 0.06,
             damping_ratio: 1.0,
             estimator_ratio: 1.0,
-            rate_noise: None,
+            rate_noise_ratio: None,
             compensates_disturbance: true,
-            known_delay: 0.0,
-            delay: 0.0,
+            known_delay_periods: 0.0,
+            delay_periods: 0.0,
             mass_ratio: 1.0,
-            held_pole: 0.0,
+            held_pole_t: 0.0,
         }
     }
 }
@@ -132,13 +132,13 @@ impl<'a> Period<'a> {
     fn new(of: &'a SampledLoop) -> Self {
         let bandwidth_rad_s = of.estimator_ratio * of.wn_t;
         let (_, gains) =
-            NoiseModel { bandwidth_rad_s, rate_noise_ratio: of.rate_noise, period_s: 1.0 }.steady();
-        Self { of, gains, pending: of.delay.max(of.known_delay).ceil() as usize + 1 }
+            NoiseModel { bandwidth_rad_s, rate_noise_ratio: of.rate_noise_ratio, period_s: 1.0 }.steady();
+        Self { of, gains, pending: of.delay_periods.max(of.known_delay_periods).ceil() as usize + 1 }
     }
 
     /// With the poses for which forces were commanded, if they matter.
     fn states(&self) -> usize {
-        let poses = if self.of.held_pole > 0.0 { self.pending } else { 0 };
+        let poses = if self.of.held_pole_t > 0.0 { self.pending } else { 0 };
         5 + self.pending + poses
     }
 
@@ -148,10 +148,10 @@ impl<'a> Period<'a> {
             wn_t,
             damping_ratio,
             compensates_disturbance,
-            known_delay,
-            delay,
+            known_delay_periods: known_delay,
+            delay_periods: delay,
             mass_ratio,
-            held_pole,
+            held_pole_t: held_pole,
             ..
         } = *self.of;
         let at = |k: usize| z.get(k).copied().unwrap_or_default();
@@ -270,7 +270,7 @@ impl SampledLoop {
     /// Largest stable `wn T`, other parameters unchanged; all smaller ones are stable too.
     pub fn largest_wn_t(&self) -> f64 {
         // Beyond, delay and hold lag by more than the damping term leads, at any gain.
-        let none = 4.0 * (1.0 + self.damping_ratio) / (self.delay + 0.5);
+        let none = 4.0 * (1.0 + self.damping_ratio) / (self.delay_periods + 0.5);
         edge(0.0, none, |wn_t| Self { wn_t, ..*self }.is_stable())
     }
 
@@ -301,9 +301,9 @@ impl SampledLoop {
 
     /// The longest stable delay, in periods, at most [`MAX_DELAY_PERIODS`]. Its known part stays as it is.
     pub fn longest_delay(&self) -> f64 {
-        let with = |delay| Self { delay, ..*self }.is_stable();
+        let with = |delay| Self { delay_periods: delay, ..*self }.is_stable();
         let longest = MAX_DELAY_PERIODS as f64;
-        if with(longest) { longest } else { edge(self.known_delay, longest, with) }
+        if with(longest) { longest } else { edge(self.known_delay_periods, longest, with) }
     }
 }
 

@@ -204,8 +204,8 @@ pub enum TargetRefusal {
 pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBound> {
     let (machine, parameters) = (constants.machine(), &constants.parameters);
     let (shortest, longest) = (
-        machine.actuator.min_length + parameters.stroke_margin,
-        machine.actuator.max_length - parameters.stroke_margin,
+        machine.actuator.min_length_m + parameters.stroke_margin_m,
+        machine.actuator.max_length_m - parameters.stroke_margin_m,
     );
     let lengths = leg_lengths(machine, pose).into_iter().enumerate();
     let mut bounds: Vec<_> = lengths
@@ -226,7 +226,7 @@ pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBoun
     bounds.push(WorkspaceBound { quantity, value: side, bound: 0.0, margin: side });
     let quantity = BoundedQuantity::Condition;
     bounds.push(WorkspaceBound { quantity, value: condition, bound: largest, margin: largest - condition });
-    let (quantity, bound) = (BoundedQuantity::UniversalSine, constants.universal_sine);
+    let (quantity, bound) = (BoundedQuantity::UniversalSine, constants.least_universal_sine);
     bounds.push(WorkspaceBound { quantity, value: sine, bound, margin: sine - bound });
     let drives = DriveCapability::of(&constants.dynamics, pose).map(|drives| drives.hardest_held());
     let (leg, force) = drives.unwrap_or((0, f64::INFINITY));
@@ -370,10 +370,10 @@ impl Survey {
     pub fn add(&mut self, constants: &Constants, now: &Motion, active_limits: LimitSet) {
         let legs = leg_motion(constants.machine(), now);
         let motion = &mut self.motion;
-        for ([shortest, longest], length) in motion.lengths_m.iter_mut().zip(legs.length) {
+        for ([shortest, longest], length) in motion.lengths_m.iter_mut().zip(legs.length_m) {
             (*shortest, *longest) = (shortest.min(length), longest.max(length));
         }
-        for (largest, rate) in motion.leg_rates_m_s.iter_mut().zip(legs.rate) {
+        for (largest, rate) in motion.leg_rates_m_s.iter_mut().zip(legs.rate_m_s) {
             *largest = largest.max(rate.abs());
         }
         motion.velocity_m_s = motion.velocity_m_s.max(now.twist.linear.norm());

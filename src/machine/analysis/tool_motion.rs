@@ -32,7 +32,7 @@ impl ToolMotion {
         let (_, end) = unit.samples().last().unwrap_or((1.0, unit.at(1.0)));
         check_target(constants, &end.pose).map_err(TargetRefusal::Target)?;
         for (t, motion) in unit.samples() {
-            let share = rise(t, 1.0).value;
+            let share = rise(t, 1.0).value_share;
             check_target(constants, &motion.pose).map_err(|bound| TargetRefusal::Way { bound, share })?;
         }
         let duration_s = unit.shortest_s(constants, speed).max(SHORTEST_S);
@@ -85,12 +85,12 @@ impl ToolMotion {
                 [twist.linear, acceleration.linear, jerk.fixed_rows::<3>(3).into()].map(|x| x.norm());
             let angular =
                 [twist.angular, acceleration.angular, jerk.fixed_rows::<3>(0).into()].map(|x| x.norm());
-            let legs = leg_motion(machine, &Motion { pose, twist, acceleration }).rate;
+            let legs = leg_motion(machine, &Motion { pose, twist, acceleration }).rate_m_s;
             let fastest = legs.into_iter().map(f64::abs).fold(0.0, f64::max);
             shortest = shortest
                 .max(duration(linear, &limits.position))
                 .max(duration(angular, &limits.orientation))
-                .max(fastest / machine.actuator.max_rate);
+                .max(fastest / machine.actuator.max_rate_m_s);
             before = acceleration;
         }
         shortest

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 use core::fmt;
 
-use super::deployment::{Control, Deployment, DeploymentLimits, Drive, Realtime, STABLE_MASSES};
+use super::deployment::{Control, Deployment, DeploymentLimits, Drive, Realtime, STABLE_MASS_RATIOS};
 use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop, edge};
 use hexad_core::control::law::estimator::SENT_ACCELERATIONS;
 
@@ -32,7 +32,7 @@ fn loops_of(
     limits: &DeploymentLimits,
 ) -> Vec<ControlLoop> {
     // Modes on legs compute the forces at the desired pose.
-    let held_pole = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole };
+    let held_pole = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole_per_s };
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
@@ -49,7 +49,7 @@ fn loops_of(
         sampled: SampledLoop {
             estimator_ratio: control.estimator_bandwidth_hz / bandwidth_hz,
             compensates_disturbance: control.compensate_disturbances,
-            held_pole: held_pole * realtime.period_s(),
+            held_pole_t: held_pole * realtime.period_s(),
             ..realtime.sampled_loop(bandwidth_hz, damping_ratio, drive.total_delay_s())
         }
         .with_feedback_gain(gain),
@@ -75,7 +75,7 @@ fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive, limits: &
     let sampled =
         loops_of(realtime, control, drive, limits).into_iter().map(|it| it.sampled).filter(is_finite);
     let delays =
-        sampled.map(|sampled| sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay));
+        sampled.map(|sampled| sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay_periods));
     delays.fold(f64::INFINITY, f64::min) * realtime.period_s() - drive.total_delay_s()
 }
 
@@ -99,7 +99,7 @@ pub(super) fn bounded_age_s(
 
 /// Whether the values from which the loop follows were all accepted.
 fn is_finite(sampled: &SampledLoop) -> bool {
-    let SampledLoop { wn_t, damping_ratio, estimator_ratio, delay, held_pole, .. } = *sampled;
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, delay_periods: delay, held_pole_t: held_pole, .. } = *sampled;
     let values = [wn_t, damping_ratio, estimator_ratio, delay, held_pole];
     values.iter().all(|value| value.is_finite())
 }
@@ -120,30 +120,30 @@ impl ControlLoop {
     /// Error if the loop is unstable because of the pole of the platform under constant forces.
     pub fn beyond_held_pole(&self) -> Option<String> {
         let Self { name, rate_hz, sampled, .. } = self;
-        let with = |held_pole| SampledLoop { held_pole, ..*sampled }.is_stable();
-        if with(sampled.held_pole) || !with(0.0) {
+        let with = |held_pole| SampledLoop { held_pole_t: held_pole, ..*sampled }.is_stable();
+        if with(sampled.held_pole_t) || !with(0.0) {
             return None;
         }
-        let stable = edge(0.0, sampled.held_pole, with) * rate_hz;
+        let stable = edge(0.0, sampled.held_pole_t, with) * rate_hz;
         Some(format!(
             "too large for the {name} loop: within it the platform leaves a pose whose forces are held with up to {:.1}/s, and \
              with {:.2} periods of delay the loop is stable to {stable:.1}/s; lower it, or raise realtime.rate_hz",
-            sampled.held_pole * rate_hz,
-            sampled.delay,
+            sampled.held_pole_t * rate_hz,
+            sampled.delay_periods,
         ))
     }
 
     /// Warning if a plausible mass would make the loop unstable.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;
-        let delay = sampled.delay;
+        let delay = sampled.delay_periods;
         if !sampled.is_stable() {
             return Some(format!(
                 "{name} loop: with {delay:.2} periods of delay it is not stable: lower the bandwidths or the damping ratios"
             ));
         }
         let (lightest, heaviest) = (1.0 / sampled.gain_margin(), 1.0 / sampled.least_gain());
-        let [light, heavy] = STABLE_MASSES;
+        let [light, heavy] = STABLE_MASS_RATIOS;
         (lightest > light || heaviest < heavy).then(|| {
             format!(
                 "{name} loop: with {delay:.2} periods of delay it is stable with {lightest:.2} to {heaviest:.2} of the modelled \
@@ -165,7 +165,7 @@ impl fmt::Display for ControlLoop {
             "{name:<12} bandwidth {bandwidth_hz:>6.2} Hz at {rate_hz:.0} Hz: wn T = {:.3}, with {:.2} periods of delay \
              stable to {limit:.3} ({:.2} Hz), gain margin {margin:.2}; stable to {beyond}{longest:.1} periods",
             sampled.wn_t,
-            sampled.delay,
+            sampled.delay_periods,
             limit * rate_hz / TAU,
         )
     }

@@ -21,7 +21,7 @@ pub fn envelope(config: &Config, model: &InverseDynamics) -> MotionEnvelope {
 
 /// The configured fidelity, or the cheapest that the envelope allows; logs the reason.
 pub fn fidelity(config: &Config) -> Fidelity {
-    let tolerance = config.deployment.control.fidelity_tolerance;
+    let tolerance = config.deployment.control.fidelity_tolerance_share;
     match config.deployment.control.fidelity {
         FidelityChoice::Fixed(Fidelity::Exact) => Fidelity::Exact,
         FidelityChoice::Fixed(fidelity) => {

@@ -38,12 +38,12 @@ const MAX_EXCHANGED_RATIO: f64 = 0.1;
 
 /// Checks the joints, then the home pose.
 pub(super) fn check(machine: &Machine, legs: &[LegSection], home: &SectionReader) {
-    let base_spans = check_joints(legs, "base_m", |leg| leg.base);
-    let platform_spans = check_joints(legs, "platform_m", |leg| leg.platform);
+    let base_spans = check_joints(legs, "base_m", |leg| leg.base_m);
+    let platform_spans = check_joints(legs, "platform_m", |leg| leg.platform_m);
 
     let pose = machine.home_pose();
     let is_impossible = |exchanged: &ExchangedHome| {
-        exchanged.margin_at_home < 0.0 || condition(machine, &pose) > MAX_CONDITION
+        exchanged.margin_at_home_m < 0.0 || condition(machine, &pose) > MAX_CONDITION
     };
     if let Some(exchanged) = exchanged_home(machine).filter(is_impossible) {
         home.reject("pose", format!("must be {exchanged}"));
@@ -60,7 +60,7 @@ pub(super) fn check(machine: &Machine, legs: &[LegSection], home: &SectionReader
 pub(super) struct ExchangedHome {
     pose: [f64; 6],
     /// Least distance of a leg from the ends of the stroke at home as it was read \[m\]; negative beyond them.
-    pub margin_at_home: f64,
+    pub margin_at_home_m: f64,
 }
 
 impl fmt::Display for ExchangedHome {
@@ -86,7 +86,7 @@ pub(super) fn exchanged_home(machine: &Machine) -> Option<ExchangedHome> {
     let is_unusual =
         Vector3::new(x, y, z).norm() < MAX_EXCHANGED_RATIO * Vector3::new(alpha, beta, gamma).norm();
     (exchanged > margin_at_home.max(0.0) && (margin_at_home < 0.0 || is_unusual))
-        .then_some(ExchangedHome { pose, margin_at_home })
+        .then_some(ExchangedHome { pose, margin_at_home_m: margin_at_home })
 }
 
 /// Root mean square distances of points from their mean.
@@ -144,7 +144,7 @@ fn check_joints(legs: &[LegSection], key: &str, joint: fn(&LegSection) -> Vector
 /// Rejects a leg whose two joint centres are those of another leg: both resist the same motion. Legs may share one centre, as on
 /// 6-3 and 3-3 platforms.
 fn check_distinct(legs: &[LegSection]) -> bool {
-    let ends: [fn(&LegSection) -> Vector3<f64>; 2] = [|leg| leg.base, |leg| leg.platform];
+    let ends: [fn(&LegSection) -> Vector3<f64>; 2] = [|leg| leg.base_m, |leg| leg.platform_m];
     let least = ends.map(|end| COINCIDENCE_SHARE * Spread::of(legs.iter().map(end)).radius);
     let mut is_distinct = true;
     for (i, leg) in legs.iter().enumerate() {
@@ -170,8 +170,8 @@ fn check_distinct(legs: &[LegSection]) -> bool {
 
 /// Checks each leg at home. Returns whether all have been read and have a direction.
 fn check_legs(machine: &Machine, legs: &[LegSection], pose: &Pose) -> bool {
-    let least = COINCIDENCE_SHARE * Spread::of(legs.iter().map(|leg| leg.platform)).radius;
-    let (shortest, longest) = (machine.actuator.min_length, machine.actuator.max_length);
+    let least = COINCIDENCE_SHARE * Spread::of(legs.iter().map(|leg| leg.platform_m)).radius;
+    let (shortest, longest) = (machine.actuator.min_length_m, machine.actuator.max_length_m);
     let stroke = format!("in [{shortest}, {longest}] (actuator.min_length_m, actuator.max_length_m)");
     let mut complete = true;
     for ((leg, length), direction) in
@@ -229,7 +229,7 @@ fn condition(machine: &Machine, pose: &Pose) -> f64 {
 
 /// Poses in all directions from `pose`.
 fn around(machine: &Machine, pose: &Pose) -> impl Iterator<Item = Pose> {
-    let shift = EXAMINED_DISTANCE * machine.joints.radius;
+    let shift = EXAMINED_DISTANCE * machine.joints.radius_m;
     (0..1_u32 << LEGS).map(move |corner| {
         let sign = |axis: u32| if corner & (1 << axis) == 0 { 1.0 } else { -1.0 };
         // Different amounts, as symmetric motions may keep a layout singular.

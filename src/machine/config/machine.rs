@@ -43,8 +43,8 @@ const INERTIA_TOLERANCE: f64 = 1e-9;
 /// Section `[[leg]]`, its reader still open for the checks that need all six.
 pub(super) struct LegSection<'t> {
     pub reader: SectionReader<'t>,
-    pub base: Vector3<f64>,
-    pub platform: Vector3<f64>,
+    pub base_m: Vector3<f64>,
+    pub platform_m: Vector3<f64>,
     /// Unit length.
     pub universal_axis: Vector3<f64>,
 }
@@ -70,15 +70,15 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
         core::array::from_fn(|i| legs.get(i).map_or(Vector3::repeat(f64::NAN), member))
     };
     let joints = Joints::new(
-        &of_leg(|leg| leg.base),
-        &of_leg(|leg| leg.platform),
+        &of_leg(|leg| leg.base_m),
+        &of_leg(|leg| leg.platform_m),
         &of_leg(|leg| leg.universal_axis),
         &TaskState::at_rest(home_pose).motion().pose,
     );
     let mut machine =
-        Machine { gravity, platform, joints, cylinder, rod, actuator, home: home_pose, max_rotation, level };
+        Machine { gravity_m_s2: gravity, platform, joints, cylinder, rod, actuator, home: home_pose, max_rotation_rad: max_rotation, level };
     if !is_friction_stated {
-        machine.actuator.friction_uncertainty = usual_friction_uncertainty(&machine);
+        machine.actuator.friction_uncertainty_n = usual_friction_uncertainty(&machine);
     }
     geometry::check(&machine, &legs, &home);
     machine
@@ -94,7 +94,7 @@ fn platform(mut section: SectionReader) -> Platform {
     if inertia.iter().all(|x| x.is_finite()) {
         check_inertia(&section, &inertia);
     }
-    Platform { mass, center_of_mass, inertia }
+    Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia }
 }
 
 /// Checks an inertia tensor: a body of positive masses has `0 < I1 <= I2 <= I3 <= I1 + I2`.
@@ -123,24 +123,24 @@ fn usual_friction_uncertainty(machine: &Machine) -> f64 {
 
 fn actuator(mut section: SectionReader) -> Actuator {
     let actuator = Actuator {
-        min_length: section.number("min_length_m", Bound::Positive),
-        max_length: section.number("max_length_m", Bound::Positive),
-        max_rate: section.number("max_rate_m_s", Bound::Positive),
-        max_force: section.number("max_force_n", Bound::Positive),
-        reflected_mass: section.number_or("reflected_mass_kg", 0.0, Bound::NotNegative),
-        viscous_friction: section.per_leg_or("viscous_friction_n_s_m", 0.0, Bound::NotNegative),
-        coulomb_friction: section.per_leg_or("coulomb_friction_n", 0.0, Bound::NotNegative),
-        load_friction: section.per_leg_or("load_friction", 0.0, Bound::Within(0.0, MAX_LOAD_FRICTION)),
+        min_length_m: section.number("min_length_m", Bound::Positive),
+        max_length_m: section.number("max_length_m", Bound::Positive),
+        max_rate_m_s: section.number("max_rate_m_s", Bound::Positive),
+        max_force_n: section.number("max_force_n", Bound::Positive),
+        reflected_mass_kg: section.number_or("reflected_mass_kg", 0.0, Bound::NotNegative),
+        viscous_friction_n_s_m: section.per_leg_or("viscous_friction_n_s_m", 0.0, Bound::NotNegative),
+        coulomb_friction_n: section.per_leg_or("coulomb_friction_n", 0.0, Bound::NotNegative),
+        load_friction_share: section.per_leg_or("load_friction", 0.0, Bound::Within(0.0, MAX_LOAD_FRICTION)),
         force_scale: section.per_leg_or("force_scale", 1.0, FORCE_SCALE_BOUND),
-        friction_uncertainty: section.number_or(FRICTION_UNCERTAINTY, 0.0, Bound::NotNegative),
-        coulomb_smoothing: Actuator::COULOMB_SMOOTHING_M_S,
+        friction_uncertainty_n: section.number_or(FRICTION_UNCERTAINTY, 0.0, Bound::NotNegative),
+        coulomb_smoothing_m_s: Actuator::COULOMB_SMOOTHING_M_S,
     };
-    if actuator.max_length <= actuator.min_length {
-        let bound = format!("must be greater than {} (actuator.min_length_m)", actuator.min_length);
+    if actuator.max_length_m <= actuator.min_length_m {
+        let bound = format!("must be greater than {} (actuator.min_length_m)", actuator.min_length_m);
         section.reject("max_length_m", bound);
     }
-    let least = LEAST_LENGTH_RATIO * actuator.max_length;
-    if actuator.min_length < least {
+    let least = LEAST_LENGTH_RATIO * actuator.max_length_m;
+    if actuator.min_length_m < least {
         let bound = format!(
             "must be at least {} (a hundredth of actuator.max_length_m): give the length at the end stop; every stop is proved for legs as \
              short as this, and for shorter ones none is",
@@ -153,14 +153,14 @@ fn actuator(mut section: SectionReader) -> Actuator {
 
 fn link(mut section: SectionReader, actuator: &Actuator) -> Link {
     let link = Link {
-        mass: section.number("mass_kg", Bound::Positive),
-        center_of_mass: section.number("center_of_mass_m", Bound::NotNegative),
-        axial_inertia: section.number("axial_inertia_kg_m2", Bound::NotNegative),
+        mass_kg: section.number("mass_kg", Bound::Positive),
+        center_of_mass_m: section.number("center_of_mass_m", Bound::NotNegative),
+        axial_inertia_kg_m2: section.number("axial_inertia_kg_m2", Bound::NotNegative),
         transverse_inertia: transverse_inertia(&mut section),
     };
     // A body of revolution has no less than half its axial inertia about every other axis.
     let least = least_over_stroke(&link.transverse_inertia, actuator);
-    let bound = 0.5 * link.axial_inertia;
+    let bound = 0.5 * link.axial_inertia_kg_m2;
     if least < bound - INERTIA_TOLERANCE * bound {
         section.reject_as(
             "transverse_inertia_kg_m2",
@@ -175,20 +175,20 @@ fn transverse_inertia(section: &mut SectionReader) -> TransverseInertia {
     const KEY: &str = "transverse_inertia_kg_m2";
     if !section.is_table(KEY) {
         let constant = section.number(KEY, Bound::NotNegative);
-        return TransverseInertia { constant, quadratic: 0.0, reference_length: 0.0 };
+        return TransverseInertia { constant_kg_m2: constant, quadratic_kg: 0.0, reference_length_m: 0.0 };
     }
     let mut table = section.section(KEY);
     TransverseInertia {
-        constant: table.number("constant_kg_m2", Bound::Finite),
-        quadratic: table.number("quadratic_kg", Bound::Finite),
-        reference_length: table.number("reference_length_m", Bound::Finite),
+        constant_kg_m2: table.number("constant_kg_m2", Bound::Finite),
+        quadratic_kg: table.number("quadratic_kg", Bound::Finite),
+        reference_length_m: table.number("reference_length_m", Bound::Finite),
     }
 }
 
 /// Least transverse inertia of a link over the stroke; NaN if a value that it depends on was rejected.
 fn least_over_stroke(inertia: &TransverseInertia, actuator: &Actuator) -> f64 {
-    let TransverseInertia { constant, quadratic, reference_length } = *inertia;
-    let (shortest, longest) = (actuator.min_length, actuator.max_length);
+    let TransverseInertia { constant_kg_m2: constant, quadratic_kg: quadratic, reference_length_m: reference_length } = *inertia;
+    let (shortest, longest) = (actuator.min_length_m, actuator.max_length_m);
     if quadratic == 0.0 {
         return constant;
     }
@@ -211,7 +211,7 @@ fn leg(mut reader: SectionReader) -> LegSection {
     if axis.amax() == 0.0 {
         reader.reject("universal_axis", "must not be zero: it is a direction");
     }
-    LegSection { reader, base, platform, universal_axis }
+    LegSection { reader, base_m: base, platform_m: platform, universal_axis }
 }
 
 /// A number rounded to six significant digits, enough for an error text.

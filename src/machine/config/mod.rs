@@ -130,7 +130,7 @@ impl Config {
         let deployment = deployment::read(&mut root, &machine);
         drop(root);
         if let Some(envelope) = &deployment.envelope {
-            machine.max_rotation = machine.max_rotation.max(envelope.largest_rotation(&machine));
+            machine.max_rotation_rad = machine.max_rotation_rad.max(envelope.largest_rotation(&machine));
         }
         match log.into_violations() {
             violations if violations.is_empty() => {
@@ -146,7 +146,7 @@ impl Config {
     pub fn resolution(&self) -> [f64; 2] {
         let [finest, coarsest] = RESOLUTION_PER_STROKE.map(|share| share * self.machine.actuator.stroke());
         let length_m = self.deployment.noise.length_m.clamp(finest, coarsest);
-        [length_m, length_m / self.machine.joints.radius]
+        [length_m, length_m / self.machine.joints.radius_m]
     }
 
     /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.

@@ -38,7 +38,7 @@ impl Context<'_> {
     /// Forces of rest, with this acceleration of a platform of so many times its mass.
     fn forces(&self, mass_ratio: f64, acceleration: [f64; 6]) -> [f64; LEGS] {
         let mut machine = self.machine.clone();
-        machine.platform.mass *= mass_ratio;
+        machine.platform.mass_kg *= mass_ratio;
         let motion = TaskState::at_rest(self.x).motion();
         let acceleration = Acceleration::from_vector(&acceleration.into());
         InverseDynamics::new(&machine).forces::<Exact>(&Motion { acceleration, ..motion }).unwrap()
@@ -57,7 +57,7 @@ impl Context<'_> {
     }
 
     fn most(&self) -> f64 {
-        self.machine.actuator.max_force
+        self.machine.actuator.max_force_n
     }
 }
 
@@ -108,7 +108,7 @@ pub const FROZEN: &[Failure] = &[
 ];
 
 fn freezes<const COUNT: usize>(measurement: &mut Measurement, context: &Context<'_>) {
-    measurement.length[..COUNT].copy_from_slice(&context.first.length[..COUNT]);
+    measurement.length_m[..COUNT].copy_from_slice(&context.first.length_m[..COUNT]);
 }
 
 /// Failures of which the worst leg or pair of legs is searched, on these machines; the legs here are examples.
@@ -128,32 +128,32 @@ pub fn freezes_one() -> [Part; LEGS] {
 }
 
 fn freezes_at<const LEG: usize>(measurement: &mut Measurement, context: &mut Context<'_>) {
-    measurement.length[LEG] = context.first.length[LEG];
+    measurement.length_m[LEG] = context.first.length_m[LEG];
 }
 
 /// Every failure with its name.
 pub const FAILURES: &[Failure] = &[
-    sensor("all lengths frozen, stamps fresh", |m, c| m.length = c.first.length),
-    sensor("one length frozen", |m, c| m.length[LEG] = c.first.length[LEG]),
+    sensor("all lengths frozen, stamps fresh", |m, c| m.length_m = c.first.length_m),
+    sensor("one length frozen", |m, c| m.length_m[LEG] = c.first.length_m[LEG]),
     sensor("two lengths frozen", |m, c| {
-        m.length[LEG] = c.first.length[LEG];
-        m.length[4] = c.first.length[4];
+        m.length_m[LEG] = c.first.length_m[LEG];
+        m.length_m[4] = c.first.length_m[4];
     }),
-    sensor("one length jumps by 1 mm", |m, _| m.length[LEG] += 1e-3),
-    sensor("one length jumps by 0.1 mm", |m, _| m.length[LEG] += 1e-4),
-    sensor("one length drifts by 1 mm/s", |m, c| m.length[LEG] += 1e-3 * c.since_s),
-    sensor("one length drifts by 10 mm/s", |m, c| m.length[LEG] += 1e-2 * c.since_s),
-    sensor("one scale 1 % too large", |m, c| m.length[LEG] += 0.01 * (m.length[LEG] - c.first.length[LEG])),
-    sensor("one scale 10 % too large", |m, c| m.length[LEG] += 0.1 * (m.length[LEG] - c.first.length[LEG])),
-    sensor("one length counts backwards", |m, c| m.length[LEG] = 2.0 * c.first.length[LEG] - m.length[LEG]),
+    sensor("one length jumps by 1 mm", |m, _| m.length_m[LEG] += 1e-3),
+    sensor("one length jumps by 0.1 mm", |m, _| m.length_m[LEG] += 1e-4),
+    sensor("one length drifts by 1 mm/s", |m, c| m.length_m[LEG] += 1e-3 * c.since_s),
+    sensor("one length drifts by 10 mm/s", |m, c| m.length_m[LEG] += 1e-2 * c.since_s),
+    sensor("one scale 1 % too large", |m, c| m.length_m[LEG] += 0.01 * (m.length_m[LEG] - c.first.length_m[LEG])),
+    sensor("one scale 10 % too large", |m, c| m.length_m[LEG] += 0.1 * (m.length_m[LEG] - c.first.length_m[LEG])),
+    sensor("one length counts backwards", |m, c| m.length_m[LEG] = 2.0 * c.first.length_m[LEG] - m.length_m[LEG]),
     ("two lengths exchanged", Part::Exchanged(Exchange::Lengths, [LEG, LEG + 1])),
     ("two legs exchanged, lengths and drives", Part::Exchanged(Exchange::LengthsAndDrives, [LEG, LEG + 1])),
     ("two legs exchanged, external pose", Part::Exchanged(Exchange::WithExternalPose, [LEG, LEG + 1])),
-    sensor("one length reads zero", |m, _| m.length[LEG] = 0.0),
-    sensor("one length is not a number", |m, _| m.length[LEG] = f64::NAN),
-    sensor("noise of 0.1 mm on one length", |m, c| m.length[LEG] += 1e-4 * c.random.gaussian()),
-    sensor("noise of 1 mm on one length", |m, c| m.length[LEG] += 1e-3 * c.random.gaussian()),
-    sensor("one length in steps of 0.5 mm", |m, _| m.length[LEG] = (m.length[LEG] / 5e-4).round() * 5e-4),
+    sensor("one length reads zero", |m, _| m.length_m[LEG] = 0.0),
+    sensor("one length is not a number", |m, _| m.length_m[LEG] = f64::NAN),
+    sensor("noise of 0.1 mm on one length", |m, c| m.length_m[LEG] += 1e-4 * c.random.gaussian()),
+    sensor("noise of 1 mm on one length", |m, c| m.length_m[LEG] += 1e-3 * c.random.gaussian()),
+    sensor("one length in steps of 0.5 mm", |m, _| m.length_m[LEG] = (m.length_m[LEG] / 5e-4).round() * 5e-4),
     sensor("no measurements", |m, c| *m = c.first),
     sensor("every second measurement missing", |m, c| {
         if c.measured.len() % 2 == 0 {
@@ -163,19 +163,19 @@ pub const FAILURES: &[Failure] = &[
     sensor("stamps frozen, lengths fresh", |m, c| m.time_ns = c.first.time_ns),
     sensor("measurements 5 ms late", |m, c| *m = c.measured_before(5 * PER_MS)),
     sensor("measurements 30 ms late", |m, c| *m = c.measured_before(30 * PER_MS)),
-    sensor("lengths 5 ms late, stamps fresh", |m, c| m.length = c.measured_before(5 * PER_MS).length),
-    sensor("lengths 20 ms late, stamps fresh", |m, c| m.length = c.measured_before(20 * PER_MS).length),
+    sensor("lengths 5 ms late, stamps fresh", |m, c| m.length_m = c.measured_before(5 * PER_MS).length_m),
+    sensor("lengths 20 ms late, stamps fresh", |m, c| m.length_m = c.measured_before(20 * PER_MS).length_m),
     sensor("stamps 5 ms ahead", |m, _| m.time_ns += 5_000_000),
     sensor("one length frozen, external pose", |m, c| {
-        m.length[LEG] = c.first.length[LEG];
+        m.length_m[LEG] = c.first.length_m[LEG];
         m.pose = Some(c.x);
     }),
     sensor("one length drifts by 10 mm/s, external pose", |m, c| {
-        m.length[LEG] += 1e-2 * c.since_s;
+        m.length_m[LEG] += 1e-2 * c.since_s;
         m.pose = Some(c.x);
     }),
     sensor("one scale 10 % too large, external pose", |m, c| {
-        m.length[LEG] += 0.1 * (m.length[LEG] - c.first.length[LEG]);
+        m.length_m[LEG] += 0.1 * (m.length_m[LEG] - c.first.length_m[LEG]);
         m.pose = Some(c.x);
     }),
     drive("one drive without force", |f, _| f[LEG] = 0.0),
@@ -216,8 +216,8 @@ pub const FAILURES: &[Failure] = &[
         Part::Reported(
             |f, _| f[LEG] *= 0.5,
             |d, c| {
-                d.force = Some(c.sent_before(0));
-                d.force.as_mut().unwrap()[LEG] *= 0.5;
+                d.force_n = Some(c.sent_before(0));
+                d.force_n.as_mut().unwrap()[LEG] *= 0.5;
             },
         ),
     ),

@@ -92,7 +92,7 @@ fn cell(
     watched_s: f64,
 ) -> Cell {
     let length_noise = if is_quiet { QUIET_NOISE_M } else { NOISE_M };
-    let sensor = SensorErrors { length_noise, length_step: STEP_M, ..SensorErrors::default() };
+    let sensor = SensorErrors { length_noise_m: length_noise, length_step_m: STEP_M, ..SensorErrors::default() };
     let imperfections = Imperfections { seed: 3, sensor, ..Imperfections::default() };
     let mut control = Rig::imperfect(config, &config.machine, &imperfections);
     control.rates = rates;
@@ -110,8 +110,8 @@ fn cell(
         let measurement = input.measurement.as_mut().unwrap();
         if let Part::Exchanged(exchange, [a, b]) = part {
             measurement.pose = (*exchange == Exchange::WithExternalPose).then_some(true_x(&control));
-            measurement.length.swap(*a, *b);
-            measurement.rate.as_mut().into_iter().for_each(|rate| rate.swap(*a, *b));
+            measurement.length_m.swap(*a, *b);
+            measurement.rate_m_s.as_mut().into_iter().for_each(|rate| rate.swap(*a, *b));
         }
         measured.push(*measurement);
         let from_engaging = situation == Situation::Engaging || is_exchanged;
@@ -155,8 +155,8 @@ fn cell(
             }
         }
         assert!(time_s < FAILS_S + 1.0 + watched_s, "{situation:?}: control never began, {output:?}");
-        sent.push(output.force);
-        let mut force = has_control.then_some(output.force);
+        sent.push(output.command_n);
+        let mut force = has_control.then_some(output.command_n);
         if let (Some(force), Some((begin_s, first))) = (&mut force, began) {
             let mut context = Context {
                 machine: &config.machine,
@@ -255,7 +255,7 @@ fn certificate_with_rates_or_stated_friction_every_failure_is_noticed_and_moves_
         [("failure", config(MACHINE), FAILURES, false), ("frozen lengths", quiet(MACHINE), FROZEN, true)]
     {
         let mut stated = config.clone();
-        stated.machine.actuator.friction_uncertainty = 0.0;
+        stated.machine.actuator.friction_uncertainty_n = 0.0;
         let worlds = [(&config, Rates::Always), (&config, Rates::Sometimes), (&stated, Rates::Never)];
         let all = failures.iter().flat_map(|failure| worlds.map(|world| (failure, world)));
         let rows = cases(all, 13)

@@ -33,7 +33,7 @@ const SWAY: [(f64, f64); 6] =
 fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -> Motion) {
     let config = folder.config();
     let mut truth = drawn(&config.machine, &mut Random::new(7));
-    let coulomb = truth.actuator.coulomb_friction;
+    let coulomb = truth.actuator.coulomb_friction_n;
     let info =
         RunInfo { name: config.name.clone(), configuration: config.text.clone(), ..RunInfo::default() };
     let mut file = RecordingFile::create(&folder.path("motion.mcap"), &info, None).unwrap();
@@ -41,19 +41,19 @@ fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -
         let release_ns = 1_000_000_000 + number * PERIOD_NS;
         let motion = motion(1e-9 * (number * PERIOD_NS) as f64);
         let share = 1.0 + drift * 1e-9 * (number * PERIOD_NS) as f64;
-        truth.actuator.coulomb_friction = coulomb.map(|force| share * force);
+        truth.actuator.coulomb_friction_n = coulomb.map(|force| share * force);
         let forces = inverse_dynamics::<Exact>(&truth, &motion).unwrap();
         let (pose, length) = (motion.pose, leg_lengths(&config.machine, &motion.pose));
         let platform =
-            PlatformState { pose, twist: motion.twist, condition: 1.0, time_to_singularity: f64::INFINITY };
+            PlatformState { pose, twist: motion.twist, condition: 1.0, time_to_singularity_s: f64::INFINITY };
         let output = Output {
             state: State::Active,
-            force: Transmission::of_motion(&truth, &motion).commands(&forces),
+            command_n: Transmission::of_motion(&truth, &motion).commands(&forces),
             platform: Some(platform),
             reference: Some(motion),
             ..Output::default()
         };
-        let measurement = Some(Measurement { time_ns: release_ns, length, ..Measurement::default() });
+        let measurement = Some(Measurement { time_ns: release_ns, length_m: length, ..Measurement::default() });
         let input = Input { release_ns, measurement, ..Input::default() };
         let cycle = CycleMessage { cycle: number, due_ns: release_ns, ..CycleMessage::new(&input, &output) };
         file.write_cycle(&cycle).unwrap();

@@ -62,12 +62,12 @@ pub(super) fn cycle(config: &Config, number: u64) -> CycleMessage {
     let output = Output {
         state: if is_fault { State::Fault } else { State::Active },
         diagnostic: if is_fault { lost } else { Diagnostic::default() },
-        force: core::array::from_fn(|leg| 10.0 * (leg as f64 + t.sin()) + peak),
+        command_n: core::array::from_fn(|leg| 10.0 * (leg as f64 + t.sin()) + peak),
         platform: Some(PlatformState {
             pose,
             twist: Twist::default(),
             condition: 8.0,
-            time_to_singularity: f64::INFINITY,
+            time_to_singularity_s: f64::INFINITY,
         }),
         error: Some(PoseError { pose: error, twist: Twist::default() }),
         reference: Some(TaskState::at_rest(x).motion()),
@@ -75,8 +75,8 @@ pub(super) fn cycle(config: &Config, number: u64) -> CycleMessage {
     };
     let measurement = Measurement {
         time_ns: release_ns - 500_000,
-        length: lengths,
-        rate: Some([0.0; 6]),
+        length_m: lengths,
+        rate_m_s: Some([0.0; 6]),
         ..Measurement::default()
     };
     let task = TaskState::at_rest(x);

@@ -38,7 +38,7 @@ pub fn struck(m: &mut Moment) {
 pub fn shaking_drive(m: &mut Moment) {
     let phase = 30.0 * core::f64::consts::TAU * m.seconds();
     let mut beside = [0.0; LEGS];
-    beside[4] = 0.1 * m.world.machine.actuator.max_force * phase.sin();
+    beside[4] = 0.1 * m.world.machine.actuator.max_force_n * phase.sin();
     m.world.grip = Grip::Beside(beside);
 }
 

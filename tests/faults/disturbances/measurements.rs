@@ -7,7 +7,7 @@ use super::{Moment, noise};
 
 /// The driver of these tests sends rates.
 fn rates<'a>(m: &'a mut Moment<'_>) -> &'a mut [f64; LEGS] {
-    m.measured().rate.as_mut().unwrap()
+    m.measured().rate_m_s.as_mut().unwrap()
 }
 
 pub fn end(m: &mut Moment) {
@@ -16,8 +16,8 @@ pub fn end(m: &mut Moment) {
 
 /// The driver repeats itself with fresh stamps.
 pub fn freeze(m: &mut Moment) {
-    let Measurement { length, rate, .. } = m.before.measurement.unwrap();
-    *m.measured() = Measurement { length, rate, ..*m.measured() };
+    let Measurement { length_m: length, rate_m_s: rate, .. } = m.before.measurement.unwrap();
+    *m.measured() = Measurement { length_m: length, rate_m_s: rate, ..*m.measured() };
 }
 
 pub fn pause_10_ms(m: &mut Moment) {
@@ -33,7 +33,7 @@ pub fn pause_30_ms(m: &mut Moment) {
 }
 
 pub fn nan_length(m: &mut Moment) {
-    m.measured().length[2] = f64::NAN;
+    m.measured().length_m[2] = f64::NAN;
 }
 
 pub fn nan_rate_once(m: &mut Moment) {
@@ -48,7 +48,7 @@ pub fn infinite_rate(m: &mut Moment) {
 
 /// An encoder that lost counts.
 pub fn jump_20_mm(m: &mut Moment) {
-    m.measured().length[3] += 0.02;
+    m.measured().length_m[3] += 0.02;
 }
 
 pub fn jump_20_mm_once(m: &mut Moment) {
@@ -59,11 +59,11 @@ pub fn jump_20_mm_once(m: &mut Moment) {
 
 /// Too small to be called a jump, and it stays.
 pub fn slip_1_mm(m: &mut Moment) {
-    m.measured().length[3] += 0.001;
+    m.measured().length_m[3] += 0.001;
 }
 
 pub fn out_of_stroke(m: &mut Moment) {
-    m.measured().length[0] = 2.4;
+    m.measured().length_m[0] = 2.4;
 }
 
 pub fn rates_of_wrong_sign(m: &mut Moment) {
@@ -108,7 +108,7 @@ pub fn stamps_run_backward(m: &mut Moment) {
 
 /// Rates behind a filter of the first order, with a time constant of 5 ms.
 pub fn filtered_rates(m: &mut Moment) {
-    let before = m.world.last.measurement.unwrap().rate.unwrap();
+    let before = m.world.last.measurement.unwrap().rate_m_s.unwrap();
     for (rate, before) in rates(m).iter_mut().zip(before) {
         *rate = before + 0.2 * (*rate - before);
     }
@@ -117,7 +117,7 @@ pub fn filtered_rates(m: &mut Moment) {
 /// What good encoders do: counts of a micrometre, rates with noise of a millimetre per second.
 pub fn noise_of_encoders(m: &mut Moment) {
     let cycle = m.cycle;
-    let Measurement { length, rate, .. } = m.measured();
+    let Measurement { length_m: length, rate_m_s: rate, .. } = m.measured();
     for (leg, (length, rate)) in length.iter_mut().zip(rate.as_mut().unwrap()).enumerate() {
         *length = (*length * 1e6).round() * 1e-6;
         *rate += 1e-3 * noise(cycle * 6 + leg as u64);

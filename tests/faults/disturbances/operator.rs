@@ -32,7 +32,7 @@ pub fn engage(m: &mut Moment) {
 pub fn engage_far_away(m: &mut Moment) {
     m.begins(|world| {
         if let Source::Still(task) = &mut world.source {
-            task.x[5] += 5.0 * world.parameters.engage_position;
+            task.x[5] += 5.0 * world.parameters.engage_position_m;
         }
     });
     if m.cycle == 1 {

@@ -25,12 +25,12 @@ pub fn drive_fault(m: &mut Moment) {
 /// The lengths beside the report are none.
 pub fn bus_failed(m: &mut Moment) {
     let measured = m.measured();
-    measured.length = [0.0; LEGS];
+    measured.length_m = [0.0; LEGS];
     measured.drives = DriveStatus { fault: Some(DriveStatus::BUS_FAILED), ..DriveStatus::default() };
 }
 
 pub fn half_of_a_force(m: &mut Moment) {
     let mut force = m.world.rig.force.unwrap_or_default();
     force[LEG] *= 0.5;
-    m.measured().drives = DriveStatus { force: Some(force), ..DriveStatus::default() };
+    m.measured().drives = DriveStatus { force_n: Some(force), ..DriveStatus::default() };
 }

@@ -96,7 +96,7 @@ fn assert_smooth(picture: Picture, world: &World, expected: &Path) {
 const ROUNDING: f64 = 1e-6;
 
 fn assert_within(bounds: &Bounds, picture: Picture, world: &World, expected: &Path) -> Peaks {
-    let peaks = world.recording.peaks(&world.parameters, world.machine.actuator.max_force);
+    let peaks = world.recording.peaks(&world.parameters, world.machine.actuator.max_force_n);
     println!("{}: {:?} {peaks:?}", picture.name, changes(world));
     draw(&picture, world);
     // The reference keeps the limits exactly, the platform but for what held forces add.
@@ -139,7 +139,7 @@ fn situations_are_what_they_say() {
             let mut world = situation.world(mode, ViolationPolicy::default(), Rates::Always);
             let output = world.cycle(|_, _| {});
             assert_eq!(output.state, situation.state());
-            assert_eq!(output.force != [0.0; 6], situation.state().has_control());
+            assert_eq!(output.command_n != [0.0; 6], situation.state().has_control());
         }
     }
 }

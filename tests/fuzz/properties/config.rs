@@ -64,16 +64,16 @@ fn check_machine(config: &Config) {
         assert!(!debug.contains("NaN") && !debug.contains("inf"), "{what}: {debug}");
     }
     let actuator = &machine.actuator;
-    assert!(0.0 < actuator.min_length && actuator.min_length < actuator.max_length);
-    assert!(actuator.max_rate > 0.0 && actuator.max_force > 0.0);
-    let masses = [machine.platform.mass, machine.cylinder.mass, machine.rod.mass];
+    assert!(0.0 < actuator.min_length_m && actuator.min_length_m < actuator.max_length_m);
+    assert!(actuator.max_rate_m_s > 0.0 && actuator.max_force_n > 0.0);
+    let masses = [machine.platform.mass_kg, machine.cylinder.mass_kg, machine.rod.mass_kg];
     assert!(masses.iter().all(|mass| *mass > 0.0), "masses {masses:?}");
     for axis in machine.joints.triples.unpack_vectors(&machine.joints.universal_axis) {
         assert!((axis.norm() - 1.0).abs() < 1e-12, "axis of length {}", axis.norm());
     }
     let home = TaskState::at_rest(machine.home);
     let lengths = leg_lengths(machine, &home.motion().pose);
-    let stroke = actuator.min_length..=actuator.max_length;
+    let stroke = actuator.min_length_m..=actuator.max_length_m;
     assert!(lengths.iter().all(|length| stroke.contains(length)), "{lengths:?} at home, of {stroke:?}");
     let (tracked, _) = Tracker::new(machine, home.motion().pose).find(machine, &lengths);
     assert_eq!(tracked, TrackingResult::Found, "forward kinematics does not find home");
@@ -92,7 +92,7 @@ fn check_machine(config: &Config) {
 fn check_forces(config: &Config, home: &TaskState) {
     let model = InverseDynamics::new(&config.machine);
     let mut moved = *home;
-    moved.xd[5] = config.machine.actuator.max_rate;
+    moved.xd[5] = config.machine.actuator.max_rate_m_s;
     moved.xdd[5] = 1.0;
     for fidelity in Fidelity::ALL {
         for state in [home, &moved] {

@@ -110,8 +110,8 @@ impl<'a> Play<'a> {
             setpoint: Some(Setpoint::motion(self.now_ns, task)),
             measurement: Some(Measurement {
                 time_ns: self.now_ns,
-                length: legs.length,
-                rate: self.has_rates.then_some(legs.rate),
+                length_m: legs.length_m,
+                rate_m_s: self.has_rates.then_some(legs.rate_m_s),
                 ..Measurement::default()
             }),
             request: self.asked,
@@ -162,8 +162,8 @@ impl<'a> Play<'a> {
             8 => setpoint.task.x[place % 6] = value,
             9 => setpoint.task.xd[place % 6] = value,
             10 => setpoint.task.xdd[place % 6] = value,
-            11 => measurement.length[place % 6] = value,
-            12 => measurement.rate.get_or_insert_default()[place % 6] = value,
+            11 => measurement.length_m[place % 6] = value,
+            12 => measurement.rate_m_s.get_or_insert_default()[place % 6] = value,
             13 => match place % 4 {
                 0 => setpoint.time_ns = bits,
                 1 => measurement.time_ns = bits,
@@ -189,8 +189,8 @@ impl<'a> Play<'a> {
                     0 => setpoint.task.x.iter_mut().for_each(|x| *x += small),
                     1 => setpoint.task.xd.iter_mut().for_each(|x| *x += 100.0 * small),
                     2 => setpoint.task.xdd.iter_mut().for_each(|x| *x += 10_000.0 * small),
-                    3 => measurement.length[place % 6] += small,
-                    _ => measurement.rate.get_or_insert_default()[place % 6] += 100.0 * small,
+                    3 => measurement.length_m[place % 6] += small,
+                    _ => measurement.rate_m_s.get_or_insert_default()[place % 6] += 100.0 * small,
                 }
             }
         }
@@ -209,15 +209,15 @@ impl<'a> Play<'a> {
     }
 
     fn check(&self, output: &Output, request: Option<Request>) {
-        let limit = CONFIG.machine.actuator.max_force;
-        let Output { state, diagnostic, force, active_limits, .. } = output;
+        let limit = CONFIG.machine.actuator.max_force_n;
+        let Output { state, diagnostic, command_n: force, active_limits, .. } = output;
         if state.has_control() {
             assert!(force.iter().all(|force| force.abs() <= limit), "{output:?}");
             let most =
-                self.parameters.force_rate * self.parameters.period_ns as f64 * 1e-9 + ROUNDING * limit;
+                self.parameters.force_rate_n_s * self.parameters.period_ns as f64 * 1e-9 + ROUNDING * limit;
             if self.last.state.has_control() {
                 let steady =
-                    force.iter().zip(&self.last.force).all(|(now, before)| (now - before).abs() <= most);
+                    force.iter().zip(&self.last.command_n).all(|(now, before)| (now - before).abs() <= most);
                 assert!(steady, "{output:?} after {:?}", self.last);
             }
             if force.iter().any(|force| force.abs() == limit) {
@@ -279,7 +279,7 @@ impl<'a> Play<'a> {
             assert!(v.norm() <= limits.velocity * (1.0 + ROUNDING), "{output:?}");
             assert!(a.norm() <= limits.acceleration * (1.0 + ROUNDING), "{output:?}");
         }
-        let lengths = leg_motion(&CONFIG.machine, &reference).length;
+        let lengths = leg_motion(&CONFIG.machine, &reference).length_m;
         let margins = lengths.map(|length| CONFIG.machine.actuator.margin(length));
         assert!(margins.into_iter().all(|margin| margin > -ROUNDING), "{margins:?} {output:?}");
     }

@@ -38,41 +38,41 @@ fn each_in_motion(recorder: &mut Recorder, faults: &[Fault]) {
 
 fn measurements_wrong(recorder: &mut Recorder) {
     // Lengths far from home's, which are found step by step.
-    recorder.run_with(30, |m| m.measured().length = [0.86, 0.86, 0.6, 0.6, 0.86, 0.86]);
+    recorder.run_with(30, |m| m.measured().length_m = [0.86, 0.86, 0.6, 0.6, 0.86, 0.86]);
     recorder.run(30);
     let faults: &[Fault] = &[
         (14, |m| m.input.measurement = m.before.measurement),
-        (14, |m| m.measured().length[2] = f64::NAN),
+        (14, |m| m.measured().length_m[2] = f64::NAN),
         (14, |m| m.rate()[1] = f64::INFINITY),
-        (14, |m| m.measured().length[3] += 0.02),
-        (14, |m| m.measured().length[0] = 1.2),
+        (14, |m| m.measured().length_m[3] += 0.02),
+        (14, |m| m.measured().length_m[0] = 1.2),
         (14, |m| m.measured().time_ns -= 1_000_000_000),
         (14, |m| m.measured().time_ns += 1_000_000_000),
         (14, |m| m.measured().time_ns = m.before.release_ns - 100_000 * (m.cycle + 6)),
         (14, |m| m.rate().iter_mut().for_each(|rate| *rate *= 1e3)),
         // One wrong message is passed over.
-        (30, |m| m.measured().length[5] += if m.cycle == 3 { 0.02 } else { 0.0 }),
+        (30, |m| m.measured().length_m[5] += if m.cycle == 3 { 0.02 } else { 0.0 }),
     ];
     each_in_motion(recorder, faults);
 }
 
 fn measurements_implausible(recorder: &mut Recorder) {
     // No pose has these lengths.
-    recorder.run_with(90, |m| m.measured().length = [1.59, 0.86, 0.86, 0.86, 0.86, 0.86]);
+    recorder.run_with(90, |m| m.measured().length_m = [1.59, 0.86, 0.86, 0.86, 0.86, 0.86]);
     let faults: &[Fault] = &[
-        (20, |m| m.measured().length[3] += 0.002),
+        (20, |m| m.measured().length_m[3] += 0.002),
         (30, |m| {
             let mut frozen = m.before.measurement.unwrap();
             frozen.time_ns = m.measured().time_ns;
             m.input.measurement = Some(frozen);
         }),
-        (30, |m| m.measured().length[4] = m.before.measurement.unwrap().length[4]),
+        (30, |m| m.measured().length_m[4] = m.before.measurement.unwrap().length_m[4]),
         (20, |m| m.rate().iter_mut().for_each(|rate| *rate = -*rate)),
         (60, |m| m.rate().iter_mut().for_each(|rate| *rate *= 0.5)),
         (30, |m| m.rate()[2] = 0.0),
         // Sensors that drift apart.
-        (80, |m| m.measured().length[1] += 2e-5 * m.cycle as f64),
-        (30, |m| m.measured().rate = None),
+        (80, |m| m.measured().length_m[1] += 2e-5 * m.cycle as f64),
+        (30, |m| m.measured().rate_m_s = None),
     ];
     each_in_motion(recorder, faults);
     // The host takes the processor for a while.
@@ -99,7 +99,7 @@ fn report(m: &mut Moment<'_>) {
     let measured = m.measured();
     measured.pose = Some(x);
     let force = Some(force.unwrap_or_default());
-    measured.drives = DriveStatus { enabled, brake_open, fault: Some(0), force };
+    measured.drives = DriveStatus { enabled, brake_open, fault: Some(0), force_n: force };
 }
 
 fn drives_and_external_poses(recorder: &mut Recorder) {
@@ -109,9 +109,9 @@ fn drives_and_external_poses(recorder: &mut Recorder) {
         (40, |m| m.measured().drives.enabled = Some(ALL & !4)),
         (40, |m| m.measured().drives.brake_open = Some(ALL & !32)),
         (10, |m| m.measured().drives.fault = Some(8)),
-        (120, |m| m.measured().drives.force.as_mut().unwrap()[1] *= 0.3),
+        (120, |m| m.measured().drives.force_n.as_mut().unwrap()[1] *= 0.3),
         // A driver that reports less and less.
-        (10, |m| m.measured().drives = DriveStatus { force: None, ..DriveStatus::default() }),
+        (10, |m| m.measured().drives = DriveStatus { force_n: None, ..DriveStatus::default() }),
         (10, |m| m.measured().pose.as_mut().unwrap()[0] = f64::NAN),
     ];
     each_in_motion(recorder, faults);
@@ -133,7 +133,7 @@ fn bus_of_drives_fails(recorder: &mut Recorder) {
         (1, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED | 8)),
         (30, |m| {
             m.measured().drives.fault = Some(DriveStatus::BUS_FAILED);
-            m.measured().length = [f64::NAN; LEGS];
+            m.measured().length_m = [f64::NAN; LEGS];
         }),
     ];
     each_in_motion(recorder, faults);

@@ -53,7 +53,7 @@ impl Moment<'_> {
     }
 
     pub fn rate(&mut self) -> &mut [f64; LEGS] {
-        self.measured().rate.as_mut().unwrap()
+        self.measured().rate_m_s.as_mut().unwrap()
     }
 
     pub fn setpoint(&mut self) -> &mut Setpoint {
@@ -242,7 +242,7 @@ impl Recorder {
         }
         self.inputs.push(input);
         let time_s = self.time_s();
-        let force = self.output.state.has_control().then_some(self.output.force);
+        let force = self.output.state.has_control().then_some(self.output.command_n);
         self.pass(force.and_then(|force| (self.drives)(time_s, force)));
     }
 
@@ -255,12 +255,12 @@ impl Recorder {
             let task =
                 if self.kind == SetpointKind::Motion { task } else { TaskState::at_rest(task.x.into()) };
             let target_speed = self.target_speed;
-            Setpoint { kind: self.kind, target_speed, ..Setpoint::motion(self.now_ns, task) }
+            Setpoint { kind: self.kind, target_speed_share: target_speed, ..Setpoint::motion(self.now_ns, task) }
         });
         Input {
             release_ns: self.now_ns + self.phase_ns,
             setpoint: setpoint.or(last.setpoint),
-            measurement: Some(Measurement { time_ns: self.now_ns, length, rate, ..Measurement::default() }),
+            measurement: Some(Measurement { time_ns: self.now_ns, length_m: length, rate_m_s: rate, ..Measurement::default() }),
             request: self.asked,
             ..Input::default()
         }
@@ -286,9 +286,9 @@ fn round(input: &mut Input) {
         xd.iter_mut().for_each(|number| to(number, RATE_DIGITS));
         xdd.iter_mut().for_each(|number| to(number, ACCELERATION_DIGITS));
     }
-    if let Some(Measurement { length, rate, pose, drives, .. }) = &mut input.measurement {
+    if let Some(Measurement { length_m: length, rate_m_s: rate, pose, drives, .. }) = &mut input.measurement {
         length.iter_mut().chain(pose.iter_mut().flatten()).for_each(|number| to(number, POSE_DIGITS));
         rate.iter_mut().flatten().for_each(|number| to(number, RATE_DIGITS));
-        drives.force.iter_mut().flatten().for_each(|number| to(number, FORCE_DIGITS));
+        drives.force_n.iter_mut().flatten().for_each(|number| to(number, FORCE_DIGITS));
     }
 }

@@ -236,8 +236,8 @@ fn weak_poses(recorder: &mut Recorder) {
             _ => 0.0045,
         };
         *m.task() = task;
-        m.measured().length = leg_lengths(&machine, &task.motion().pose);
-        m.measured().rate = None;
+        m.measured().length_m = leg_lengths(&machine, &task.motion().pose);
+        m.measured().rate_m_s = None;
     });
     recorder.run(20);
     recorder.engage();
@@ -252,8 +252,8 @@ fn near_singular(recorder: &mut Recorder) {
     let (machine, mut task) = (recorder.config.machine.clone(), TaskState::at_rest(recorder.x().into()));
     recorder.run_with(500, |m| {
         task.x[2] += if m.cycle < 250 { 0.0024 } else { -0.0024 };
-        m.measured().length = leg_lengths(&machine, &task.motion().pose);
-        m.measured().rate = None;
+        m.measured().length_m = leg_lengths(&machine, &task.motion().pose);
+        m.measured().rate_m_s = None;
     });
     recorder.run(20);
     recorder.engage();

@@ -179,7 +179,7 @@ fn drive_with_frozen_stamps(name: &str, config: &Config, mut operator: Client) -
         } else {
             after += 1;
         }
-        let length_m = simulator.leg_motion().length;
+        let length_m = simulator.leg_motion().length_m;
         setpoints.publish(time_ns, peer::setpoint(time_ns)).expect("to send");
         measured.publish(time_ns, MeasuredMessage { length_m, ..Default::default() }).expect("to send");
         let Some(message) = forces.receive_latest() else { continue };

@@ -109,7 +109,7 @@ pub fn run_with(
         let input = input(&scenario, &observed, &source, &mut channel, &mut frozen);
         let output = observed.cycle(&input);
         if let Some(measurement) = input.measurement.filter(|_| output.state.has_control()) {
-            measured[usize::from(measurement.rate.is_some())] += 1;
+            measured[usize::from(measurement.rate_m_s.is_some())] += 1;
         }
         let policies_apart = twin.as_mut().and_then(|twin| twin.apart(&observed.controller, &input, &output));
         watch(&observed, &input, &output);
@@ -177,7 +177,7 @@ impl Twin {
 /// control could do about it.
 fn is_carried_out(observed: &Rig) -> bool {
     let actuator = &observed.machine.actuator;
-    observed.force.is_none() && observed.measurement().length.iter().any(|length| !actuator.contains(*length))
+    observed.force.is_none() && observed.measurement().length_m.iter().any(|length| !actuator.contains(*length))
 }
 
 /// Faults that ended control, but for the operator's and those of lost measurements.
@@ -297,7 +297,7 @@ fn faded(task: &TaskState, from: &Vector6<f64>, t: f64, fade_s: f64) -> TaskStat
     if t >= fade_s {
         return *task;
     }
-    let Profile { value, rate, accel } = rise(t, fade_s);
+    let Profile { value_share: value, rate_per_s: rate, accel_per_s2: accel } = rise(t, fade_s);
     let d = task.x - from;
     TaskState {
         x: from + d * value,

@@ -133,7 +133,7 @@ impl Scenario {
 /// Friction and stiction of up to 1 % and 0.2 % of the largest force, half a period of dead time, a tenth more or less mass, noise
 /// and steps of the sensors of micrometres.
 fn imperfections(genes: &mut Reader<'_>, machine: &Machine, period_s: f64) -> Imperfections {
-    let (most, mass) = (machine.actuator.max_force / STRONGER, machine.platform.mass);
+    let (most, mass) = (machine.actuator.max_force_n / STRONGER, machine.platform.mass_kg);
     Imperfections {
         seed: 1,
         drive: DriveErrors {
@@ -141,18 +141,18 @@ fn imperfections(genes: &mut Reader<'_>, machine: &Machine, period_s: f64) -> Im
             ..DriveErrors::default()
         },
         friction: Friction {
-            coulomb: genes.sometimes("friction", 0.3, 0.0, 0.01) * most,
-            stiction: genes.sometimes("stiction", 0.5, 0.0, 0.002) * most,
+            coulomb_n: genes.sometimes("friction", 0.3, 0.0, 0.01) * most,
+            stiction_n: genes.sometimes("stiction", 0.5, 0.0, 0.002) * most,
             ..Friction::default()
         },
         sensor: SensorErrors {
-            length_noise: genes.sometimes("noise", 0.5, 0.0, 2e-6),
-            length_step: genes.sometimes("step", 0.5, 0.0, 1e-6),
+            length_noise_m: genes.sometimes("noise", 0.5, 0.0, 2e-6),
+            length_step_m: genes.sometimes("step", 0.5, 0.0, 1e-6),
             ..SensorErrors::default()
         },
         build: BuildErrors {
-            payload: genes.sometimes("payload", 0.5, -0.1, 0.1) * mass,
-            payload_at: machine.platform.center_of_mass,
+            payload_kg: genes.sometimes("payload", 0.5, -0.1, 0.1) * mass,
+            payload_at_m: machine.platform.center_of_mass_m,
             ..BuildErrors::default()
         },
         ..Imperfections::default()

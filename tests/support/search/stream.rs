@@ -148,7 +148,7 @@ impl Stream {
             Shape::Sines => [sine(amplitude, omega, phase), sine(0.3 * amplitude, 1.7 * omega, 0.0)],
             Shape::Circle => [sine(amplitude, omega, phase), sine(amplitude, omega, phase + 0.25 * TAU)],
             Shape::Spiral => {
-                let Profile { value, rate, accel } = rise(t, 4.0 * TAU / omega);
+                let Profile { value_share: value, rate_per_s: rate, accel_per_s2: accel } = rise(t, 4.0 * TAU / omega);
                 [phase, phase + 0.25 * TAU].map(|phase| {
                     let [x, v, a] = sine(3.0 * amplitude, omega, phase);
                     [value * x, value * v + rate * x, value * a + 2.0 * rate * v + accel * x]
@@ -167,7 +167,7 @@ impl Stream {
             Shape::Moves => {
                 let step_s = self.move_s();
                 let index = (t / step_s).floor();
-                let Profile { value, rate, accel } = rise(t - index * step_s, step_s);
+                let Profile { value_share: value, rate_per_s: rate, accel_per_s2: accel } = rise(t - index * step_s, step_s);
                 [0, 1].map(|axis| {
                     let [from, to] = [0.0, 1.0].map(|next| self.level(index + next, axis));
                     [from + (to - from) * value, (to - from) * rate, (to - from) * accel]
@@ -233,7 +233,7 @@ fn reach(machine: &Machine, parameters: &Parameters, direction: &Vector6<f64>) -
     let is_inside = |x: &Vector6<f64>| {
         let pose = TaskState { x: *x, ..TaskState::default() }.motion().pose;
         let lengths = leg_lengths(machine, &pose);
-        lengths.iter().all(|length| machine.actuator.margin(*length) > parameters.stroke_margin)
+        lengths.iter().all(|length| machine.actuator.margin(*length) > parameters.stroke_margin_m)
             && parameters.envelope.is_none_or(|envelope| {
                 let ranges = envelope.lowest.iter().zip(&envelope.highest);
                 x.iter().zip(ranges).all(|(x, (low, high))| (low..=high).contains(&x))

@@ -49,7 +49,7 @@ pub struct Setup {
 impl Setup {
     /// What the estimator knows of the delay, half a period at most, before the release; perfect sensors.
     pub fn of(sampled: SampledLoop) -> Self {
-        Self { sampled, age: sampled.known_delay.min(0.5), sensor: SensorErrors::default() }
+        Self { sampled, age: sampled.known_delay_periods.min(0.5), sensor: SensorErrors::default() }
     }
 }
 
@@ -78,12 +78,12 @@ pub struct Delayed {
 impl Delayed {
     pub fn new(config: &Config, setup: &Setup) -> Self {
         let parameters = parameters(config, setup);
-        let SampledLoop { delay, mass_ratio, .. } = setup.sampled;
+        let SampledLoop { delay_periods: delay, mass_ratio, .. } = setup.sampled;
         let in_ns = |periods: f64| (periods * parameters.period_ns as f64).round() as u64;
         let mut wanted = Imperfections { seed: 1, sensor: setup.sensor, ..Imperfections::default() };
         wanted.drive.dead_time_ns = in_ns(delay) - in_ns(setup.age);
         let mut strong = config.machine.clone();
-        strong.actuator.max_force = UNLIMITED;
+        strong.actuator.max_force_n = UNLIMITED;
         let plant = &config.deployment.plant;
         let built = scaled(&strong, mass_ratio);
         let setpoint = TaskState::at_rest(config.machine.home);
@@ -109,7 +109,7 @@ impl Delayed {
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
-            measurement: Some(Measurement { time_ns, length, rate: Some(rate), ..Measurement::default() }),
+            measurement: Some(Measurement { time_ns, length_m: length, rate_m_s: Some(rate), ..Measurement::default() }),
             request: Some(OperatorRequest {
                 request: Request::Engage,
                 message: MessageId { epoch: START_NS, sequence: 1 },
@@ -117,7 +117,7 @@ impl Delayed {
             ..Input::default()
         });
         self.hardware.advance(self.age_ns, self.force);
-        self.force = output.state.has_control().then_some(output.force);
+        self.force = output.state.has_control().then_some(output.command_n);
         if let Some(force) = &mut self.force {
             let push = core::mem::take(&mut self.push);
             *force = core::array::from_fn(|leg| force[leg] + push[leg]);
@@ -148,7 +148,7 @@ impl Delayed {
 fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let FidelityChoice::Fixed(fidelity) = config.deployment.control.fidelity else { panic!("not fixed") };
     let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
-    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise, .. } = setup.sampled;
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise_ratio: rate_noise, .. } = setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);
     let law = Law::new(
@@ -160,21 +160,21 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
         &parameters.limits,
     );
     Parameters {
-        law: Law { max_compensated_disturbance: Vector6::repeat(UNLIMITED), ..law },
+        law: Law { max_compensated_acceleration: Vector6::repeat(UNLIMITED), ..law },
         noise: NoiseModel {
             bandwidth_rad_s: estimator_ratio * wn,
             rate_noise_ratio: rate_noise.map(|ratio| ratio * config.deployment.realtime.rate_hz),
             period_s: parameters.noise.period_s,
         },
         // What the estimator knows beside the age of the measurement.
-        force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64)
+        force_delay_ns: ((setup.sampled.known_delay_periods - setup.age).max(0.0) * parameters.period_ns as f64)
             as u64,
-        force_rate: UNLIMITED,
+        force_rate_n_s: UNLIMITED,
         // Disturbances are not faults here.
         payload_change_kg: Some(UNLIMITED),
-        disturbance_step: Some(UNLIMITED),
+        disturbance_step_m_s2: Some(UNLIMITED),
         feedback_scale: UNLIMITED,
-        reading_errors: ReadingErrors { deviation: UNLIMITED, resolution: 0.0 },
+        reading_errors: ReadingErrors { deviation_m: UNLIMITED, resolution_m: 0.0 },
         ..parameters
     }
 }
@@ -182,18 +182,18 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
 /// A machine of which every part weighs so much more.
 pub fn scaled(machine: &Machine, ratio: f64) -> Machine {
     let mut scaled = machine.clone();
-    scaled.platform.mass *= ratio;
+    scaled.platform.mass_kg *= ratio;
     scaled.platform.inertia *= ratio;
     for link in [&mut scaled.cylinder, &mut scaled.rod] {
-        link.mass *= ratio;
-        link.axial_inertia *= ratio;
-        link.transverse_inertia.constant *= ratio;
-        link.transverse_inertia.quadratic *= ratio;
+        link.mass_kg *= ratio;
+        link.axial_inertia_kg_m2 *= ratio;
+        link.transverse_inertia.constant_kg_m2 *= ratio;
+        link.transverse_inertia.quadratic_kg *= ratio;
     }
     let actuator = &mut scaled.actuator;
-    actuator.reflected_mass *= ratio;
-    actuator.viscous_friction.iter_mut().for_each(|friction| *friction *= ratio);
-    actuator.coulomb_friction.iter_mut().for_each(|friction| *friction *= ratio);
+    actuator.reflected_mass_kg *= ratio;
+    actuator.viscous_friction_n_s_m.iter_mut().for_each(|friction| *friction *= ratio);
+    actuator.coulomb_friction_n.iter_mut().for_each(|friction| *friction *= ratio);
     scaled
 }
 

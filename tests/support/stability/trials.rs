@@ -44,7 +44,7 @@ pub enum End {
 /// X of a pose, up to `angle` \[rad\] from home on every axis, by number.
 pub fn pose(machine: &Machine, angle: f64, number: u64) -> [f64; 6] {
     let mut random = Random::new(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 2008);
-    let shift = SHIFT * machine.joints.radius;
+    let shift = SHIFT * machine.joints.radius_m;
     let sizes = [angle, angle, angle, shift, shift, shift];
     std::array::from_fn(|i| machine.home[i] + sizes[i] * random.signed())
 }

@@ -89,7 +89,7 @@ pub(super) fn test_brakes(
     }
     let frames = Frames::new();
     let machine = &machine.machine;
-    let middle_m = machine.actuator.min_length.midpoint(machine.actuator.max_length);
+    let middle_m = machine.actuator.min_length_m.midpoint(machine.actuator.max_length_m);
     let (mut bus, devices, mut data) = operational(&frames, &file.clone().with_brakes_held(), middle_m)?;
     let outcome = brake_test::test(&mut bus, &devices, &mut data, file, machine, || stop.is_requested());
     leave(bus, devices);

@@ -42,7 +42,7 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
     test_brakes(&file, &machine, &stop)?.map_err(before_start)?;
     let frames = Frames::new();
     let actuator = &machine.machine.actuator;
-    let middle_m = actuator.min_length.midpoint(actuator.max_length);
+    let middle_m = actuator.min_length_m.midpoint(actuator.max_length_m);
     let (mut bus, devices, mut data) = operational(&frames, &file, middle_m)?;
     // The first inputs; the host may lose a frame.
     let mut exchange = Exchange::Lost;

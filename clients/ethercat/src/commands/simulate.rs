@@ -34,7 +34,7 @@ pub fn simulate(
     }
     let actuator = &machine.machine.actuator;
     let mut segment = if is_uncoupled {
-        let middle_m = actuator.min_length.midpoint(actuator.max_length);
+        let middle_m = actuator.min_length_m.midpoint(actuator.max_length_m);
         simulation::uncoupled_segment(&file, middle_m, socket.now_ns())
     } else {
         simulation::segment(&file, &machine, socket.now_ns())

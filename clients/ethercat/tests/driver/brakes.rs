@@ -15,7 +15,7 @@ use super::rig::Rig;
 fn test_loads() -> [f64; LEGS] {
     let machine = machine().machine;
     let holding_n = holding_forces(&machine, machine.home_pose()).unwrap();
-    holding_n.map(|holding_n| test_load_n(holding_n, machine.actuator.max_force))
+    holding_n.map(|holding_n| test_load_n(holding_n, machine.actuator.max_force_n))
 }
 
 /// Tests the brakes of an edited segment; the result, the segment afterwards, the motion of each leg \[mm\].
@@ -28,7 +28,7 @@ fn tested(file: &DrivesFile, edit: impl FnOnce(&mut Segment)) -> (Result<(), Str
     let held = file.clone().with_brakes_held();
     let (devices, clock) = up(&mut bus, &held).unwrap();
     let machine = machine().machine;
-    let middle_m = machine.actuator.min_length.midpoint(machine.actuator.max_length);
+    let middle_m = machine.actuator.min_length_m.midpoint(machine.actuator.max_length_m);
     let mut data = ProcessData::new(file, middle_m, clock);
     let result = brake_test::test(&mut bus, &devices, &mut data, file, &machine, || false);
     let mut segment = bus.wire.link.segment;

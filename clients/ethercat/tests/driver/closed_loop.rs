@@ -35,7 +35,7 @@ fn plant_alone(file: &DrivesFile, is_stepped: bool, motion: BuiltInMotion, secon
     let mut machine = machine();
     if is_stepped {
         let step_n = file.legs[0].units().newtons_per_permille();
-        machine.deployment.plant.imperfections.drive.force_step = step_n;
+        machine.deployment.plant.imperfections.drive.force_step_n = step_n;
     }
     let (mut daemon, mut plant) =
         (TestDaemon::new(&machine, motion, seconds), machine.deployment.plant.hardware(&machine.machine));
@@ -43,7 +43,7 @@ fn plant_alone(file: &DrivesFile, is_stepped: bool, motion: BuiltInMotion, secon
     let mut cycle = 0;
     loop {
         let measurement =
-            Measurement { time_ns: now_ns, length: plant.measure().0, ..Measurement::default() };
+            Measurement { time_ns: now_ns, length_m: plant.measure().0, ..Measurement::default() };
         let output = daemon.respond(now_ns, measurement);
         if cycle == 300 {
             daemon.ask(Request::Engage);
@@ -57,7 +57,7 @@ fn plant_alone(file: &DrivesFile, is_stepped: bool, motion: BuiltInMotion, secon
             errors.add((plant.simulator().state().pose.position - desired).norm());
         }
         plant.advance(1_000_000, force);
-        force = output.state.has_control().then_some(output.force);
+        force = output.state.has_control().then_some(output.command_n);
         now_ns += 1_000_000;
         cycle += 1;
         assert!(daemon.motion_ns.is_some() || cycle < 3000, "{:?}", output.diagnostic);

@@ -53,7 +53,7 @@ impl TestDaemon {
             controller: Controller::new(&machine.machine, parameters),
             rest: machine.machine.home,
             scene,
-            timeline: Timeline::new(&machine.machine, &home, &scene.at(0.0).x, scene.duration),
+            timeline: Timeline::new(&machine.machine, &home, &scene.at(0.0).x, scene.duration_s),
             motion_ns: None,
             request: None,
             sequence: 0,
@@ -151,7 +151,7 @@ impl<'f> Rig<'f> {
     fn start(mut bus: TestBus<'f>, file: &DrivesFile, daemon: TestDaemon) -> Self {
         let (devices, clock) = up(&mut bus, file).unwrap();
         let actuator = &machine().machine.actuator;
-        let middle_m = actuator.min_length.midpoint(actuator.max_length);
+        let middle_m = actuator.min_length_m.midpoint(actuator.max_length_m);
         let driver = Driver::new(ProcessData::new(file, middle_m, clock), &file.bus, daemon);
         Self { bus, devices, driver }
     }

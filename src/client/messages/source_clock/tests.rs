@@ -133,7 +133,7 @@ fn run(world: World, rule: ClockRule, seed: u64) -> [f64; 3] {
             counts[0] += f64::from(u8::from(found.is_ok()));
             counts[1] += 1.0;
         }
-        let Ok(SourceInstant { time_ns, rate: found }) = found else { continue };
+        let Ok(SourceInstant { time_ns, rate_ratio: found }) = found else { continue };
         age = age.max(arrival - stamp_s / rate);
         if t - *followed_since.get_or_insert(t) > 5.0 {
             deviation = deviation.max((1e-9 * time_ns as f64 - stamp_s / rate).abs());

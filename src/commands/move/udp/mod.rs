@@ -103,7 +103,7 @@ pub fn follow(
 
 /// Home, lowered along gravity by nine tenths of the way that the workspace permits.
 fn lowest_comfortable(constants: &Constants, home: &[f64; 6]) -> [f64; 6] {
-    let down = constants.machine().gravity.try_normalize(0.0).unwrap_or_default();
+    let down = constants.machine().gravity_m_s2.try_normalize(0.0).unwrap_or_default();
     let lowered = |by: f64| -> [f64; 6] {
         let [alpha, beta, gamma, x, y, z] = *home;
         [alpha, beta, gamma, x + by * down.x, y + by * down.y, z + by * down.z]

@@ -37,13 +37,13 @@ pub(in crate::control) fn actuate(
     let command = transmission.commands(&force);
     limiter.limit(cycle, &command, (&motion, &transmission), limited)?;
     limited.active_limits.check(Limit::Compensation, parameters.law.compensation_ratio(&at_begin));
-    if limited.command != command {
+    if limited.command_n != command {
         let (machine, missing) = (constants.machine(), &limited.wrench_error);
         let missing =
             constants.acceleration_by_command.acceleration_by_wrench(machine, &motion.pose, missing);
         sent.0 += missing.0;
         errors.record_removed_acceleration(constants, &missing);
     }
-    errors.record_sent(begin_ns, &sent, &transmission.leg_forces(&limited.command));
+    errors.record_sent(begin_ns, &sent, &transmission.leg_forces(&limited.command_n));
     Ok(())
 }

@@ -98,12 +98,12 @@ impl ErrorTracker {
             let EstimatorConstants { reading_errors, .. } = &constants.estimator;
             let disturbance_now = &estimator.at_measurement().disturbance;
             let mut check = || {
-                sensors.check(&located.measurement.length, reading_errors, &constants.frozen_leg, legs)?;
+                sensors.check(&located.measurement.length_m, reading_errors, &constants.frozen_leg, legs)?;
                 check_innovation(constants, &innovation, interval_s, located)?;
                 drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
             };
             self.measurement_diagnostic = check().err();
-            if constants.machine().actuator.friction_uncertainty > 0.0 {
+            if constants.machine().actuator.friction_uncertainty_n > 0.0 {
                 let (_, rates) = leg_lengths_and_rates(constants.machine(), &desired.pose, &desired.twist);
                 friction.update(&rates, interval_s);
             }
@@ -112,14 +112,14 @@ impl ErrorTracker {
                     &constants.disturbance_bounds,
                     estimator.at_measurement(),
                     &desired,
-                    (&drives.sudden_disturbance, friction),
+                    (&drives.sudden_acceleration, friction),
                     interval_s,
                 )
                 .err();
         }
         let mut twist = located.platform.twist;
         // A measurement from before the start of control shows another motion.
-        if located.measurement.rate.is_none() && interval_s >= 0.0 {
+        if located.measurement.rate_m_s.is_none() && interval_s >= 0.0 {
             let rate = &estimator.at_measurement().rate;
             error.twist = if acts_on_legs {
                 localization.twist_of(constants, rate).unwrap_or(error.twist)
@@ -209,7 +209,7 @@ fn check_innovation(
     let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
     let Twist { angular, linear } = Twist::from_vector(innovation);
     let largest =
-        if acts_on_legs { innovation.amax() } else { linear.norm() + constants.arm * angular.norm() };
+        if acts_on_legs { innovation.amax() } else { linear.norm() + constants.arm_m * angular.norm() };
     if largest <= bound {
         return Ok(());
     }
@@ -233,12 +233,12 @@ fn check_innovation(
 fn measured(
     cycle: &Cycle<'_>,
     desired: &Motion,
-    Located { measurement, rate, platform }: &Located<'_>,
+    Located { measurement, rate_m_s: rate, platform }: &Located<'_>,
 ) -> (PoseError, ErrorCoordinates) {
     let constants = cycle.constants;
     let error = PoseError::new(desired, &platform.pose, &platform.twist);
     let deviation = match constants.parameters.law.mode.acts_on_legs() {
-        true => ErrorCoordinates::of_legs(constants.machine(), desired, &measurement.length, rate),
+        true => ErrorCoordinates::of_legs(constants.machine(), desired, &measurement.length_m, rate),
         false => ErrorCoordinates::from(&error),
     };
     (error, deviation)

@@ -58,7 +58,7 @@ pub struct Law {
     pub leg_masses: LegMasses,
     /// Largest disturbance that the estimator compensates: \[rad/s^2\] and \[m/s^2\], or \[m/s^2\] of each
     /// leg.
-    pub max_compensated_disturbance: Vector6<f64>,
+    pub max_compensated_acceleration: Vector6<f64>,
 }
 
 /// Largest disturbance, relative to the acceleration limit: a payload or friction that the model lacks.
@@ -84,12 +84,12 @@ impl Law {
             ControlMode::JointPd => {
                 let home = TaskState::at_rest(machine.home).motion();
                 let weight = InverseDynamics::new(machine).forces::<Gravity>(&home).unwrap_or_default();
-                max_compensated_disturbance += Vector6::from(weight).abs().component_div(&leg_masses.mass);
+                max_compensated_disturbance += Vector6::from(weight).abs().component_div(&leg_masses.mass_kg);
             }
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
         let Pair { angular: orientation, linear: position } = gains;
-        Self { mode, position, orientation, compensates_disturbance, leg_masses, max_compensated_disturbance }
+        Self { mode, position, orientation, compensates_disturbance, leg_masses, max_compensated_acceleration: max_compensated_disturbance }
     }
 
     /// Largest acceleration of a leg that a mode without inertia leaves to feedback: the reference's largest
@@ -111,7 +111,7 @@ impl Law {
         let Self { position, orientation, .. } = self;
         let first = if self.mode.acts_on_legs() { position } else { orientation };
         let all = |first: f64, second: f64| Vector6::new(first, first, first, second, second, second);
-        (all(first.stiffness, position.stiffness), all(first.damping, position.damping))
+        (all(first.kp_per_s2, position.kp_per_s2), all(first.kd_per_s, position.kd_per_s))
     }
 
     /// Commanded acceleration `Kp e + Kd e' + B^-1 d`, from the estimate at the instant at which the force
@@ -134,7 +134,7 @@ impl Law {
         if !self.compensates_disturbance {
             return 0.0;
         }
-        estimate.disturbance.component_div(&self.max_compensated_disturbance).amax()
+        estimate.disturbance.component_div(&self.max_compensated_acceleration).amax()
     }
 
     /// Motion whose forces the mode commands. Computed torque: the predicted pose (reference minus predicted
@@ -166,6 +166,6 @@ impl Law {
         &self,
         LegAccelerations(acceleration): &LegAccelerations,
     ) -> [f64; LEGS] {
-        acceleration.component_mul(&self.leg_masses.mass).into()
+        acceleration.component_mul(&self.leg_masses.mass_kg).into()
     }
 }

@@ -92,9 +92,9 @@ fn share_within(desired: &Vector3<f64>, added: &Vector3<f64>, bound: f64) -> f64
 
 fn scale_leg_accelerations(cycle: &Cycle<'_>, wanted: &Vector6<f64>) -> Vector6<f64> {
     let Parameters { limits, feedback_scale, law, .. } = &cycle.constants.parameters;
-    let limit = limits.position.acceleration + cycle.constants.arm * limits.orientation.acceleration;
+    let limit = limits.position.acceleration + cycle.constants.arm_m * limits.orientation.acceleration;
     let bounds =
-        law.max_compensated_disturbance.map(|saturation| (1.0 + feedback_scale) * limit + saturation);
+        law.max_compensated_acceleration.map(|saturation| (1.0 + feedback_scale) * limit + saturation);
     let excess = wanted.component_div(&bounds).amax();
     if excess > 1.0 { wanted / excess } else { *wanted }
 }

@@ -17,7 +17,7 @@ use crate::model::transmission::Transmission;
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control) struct LimitedForces {
     /// Commands to the drives \[N\].
-    pub command: [f64; LEGS],
+    pub command_n: [f64; LEGS],
     /// Wrench of the limited commands minus that of the wanted ones, about C; zero if no limit acts.
     pub wrench_error: Wrench,
     pub active_limits: LimitSet,
@@ -45,7 +45,7 @@ impl ForceLimiter {
         let Cycle { constants, state, .. } = *cycle;
         let possible = limit_magnitude(constants, wanted, (motion, transmission))?;
         let command = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
-        limited.command = command;
+        limited.command_n = command;
         limited.active_limits = LimitSet::default()
             .with(Limit::Force, possible != *wanted)
             .with(Limit::ForceRate, command != possible);
@@ -59,7 +59,7 @@ impl ForceLimiter {
     /// Limits the change since the last cycle. All legs are scaled by one factor.
     fn limit_rate(&self, constants: &Constants, command: &[f64; LEGS]) -> [f64; LEGS] {
         let parameters = &constants.parameters;
-        let change = parameters.force_rate * parameters.period_ns as f64 * 1e-9;
+        let change = parameters.force_rate_n_s * parameters.period_ns as f64 * 1e-9;
         scale_into_bounds(&self.last, command, |last| (last - change, last + change))
     }
 }
@@ -83,7 +83,7 @@ fn limit_magnitude(
     command: &[f64; LEGS],
     (motion, transmission): (&Motion, &Transmission),
 ) -> Result<[f64; LEGS], Diagnostic> {
-    let limit = constants.machine().actuator.max_force;
+    let limit = constants.machine().actuator.max_force_n;
     if command.iter().all(|value| value.abs() <= limit) {
         return Ok(*command);
     }

@@ -7,15 +7,15 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Kp \[1/s^2\].
-    pub stiffness: f64,
+    pub kp_per_s2: f64,
     /// Kd \[1/s\].
-    pub damping: f64,
+    pub kd_per_s: f64,
 }
 
 impl Gains {
     /// Gains of a bandwidth: `Kp = wn^2`, `Kd = 2 zeta wn`, `wn = 2 pi bandwidth`.
     pub fn new(bandwidth_hz: f64, damping_ratio: f64) -> Self {
         let wn = core::f64::consts::TAU * bandwidth_hz;
-        Self { stiffness: wn * wn, damping: 2.0 * damping_ratio * wn }
+        Self { kp_per_s2: wn * wn, kd_per_s: 2.0 * damping_ratio * wn }
     }
 }

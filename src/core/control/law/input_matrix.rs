@@ -45,7 +45,7 @@ impl InputMatrix {
         let by_force = mobility * wrenches;
         let acts_on_legs = mode.acts_on_legs();
         let matrix_and_inverse = if acts_on_legs {
-            with_inverse(wrenches.transpose() * by_force * Matrix6::from_diagonal(&leg_masses.mass))
+            with_inverse(wrenches.transpose() * by_force * Matrix6::from_diagonal(&leg_masses.mass_kg))
         } else if fidelity == Fidelity::Exact {
             None
         } else {
@@ -113,7 +113,7 @@ fn with_inverse(matrix: Matrix6<f64>) -> Option<[Matrix6<f64>; 2]> {
 
 /// Leg forces of a fidelity at home without gravity, one column per unit acceleration.
 fn forces_by_unit_acceleration(machine: &Machine, fidelity: Fidelity) -> Matrix6<f64> {
-    let weightless = InverseDynamics::new(&Machine { gravity: Vector3::zeros(), ..machine.clone() });
+    let weightless = InverseDynamics::new(&Machine { gravity_m_s2: Vector3::zeros(), ..machine.clone() });
     let pose = machine.home_pose();
     let column = |k: usize| {
         let acceleration = Acceleration::from_vector(&Vector6::ith(k, 1.0));

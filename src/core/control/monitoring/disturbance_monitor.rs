@@ -96,7 +96,7 @@ pub struct DisturbanceBounds {
     /// Bound on a payload change \[kg\].
     pub max_payload_change_kg: f64,
     /// Bound on a sudden disturbance \[m/s^2\].
-    pub max_sudden_disturbance: f64,
+    pub max_sudden_acceleration_m_s2: f64,
     /// Bound on a swing of the error \[m\].
     swing: f64,
     /// Swing of the error per acceleration of the reference \[m / (m/s^2)\].
@@ -114,30 +114,30 @@ pub struct DisturbanceBounds {
 impl DisturbanceBounds {
     /// Bounds of a machine. `arm` is the radius that weights angles \[m\].
     pub fn new(machine: &Machine, parameters: &Parameters, input_matrix: &InputMatrix, arm: f64) -> Self {
-        let Parameters { law, payload_change_kg, disturbance_step, .. } = parameters;
-        let ReadingErrors { deviation: noise, .. } = parameters.reading_errors;
+        let Parameters { law, payload_change_kg, disturbance_step_m_s2: disturbance_step, .. } = parameters;
+        let ReadingErrors { deviation_m: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
-        let has_weight = expects_forces && machine.gravity.norm_squared() > 0.0;
-        let gravity_over_square = machine.gravity / machine.gravity.norm_squared().max(f64::MIN_POSITIVE);
+        let has_weight = expects_forces && machine.gravity_m_s2.norm_squared() > 0.0;
+        let gravity_over_square = machine.gravity_m_s2 / machine.gravity_m_s2.norm_squared().max(f64::MIN_POSITIVE);
         let along_gravity =
             Vector6::new(0.0, 0.0, 0.0, gravity_over_square.x, gravity_over_square.y, gravity_over_square.z);
         let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
         let by_force = input_matrix.acceleration_by_force(machine, &machine.home_pose());
         let friction = FrictionEffects {
-            force: machine.actuator.friction_uncertainty,
-            payload: by_force.tr_mul(&payload_by_disturbance).into(),
-            acceleration: core::array::from_fn(|leg| weighted(&by_force.column(leg).into(), arm).norm()),
+            force_n: machine.actuator.friction_uncertainty_n,
+            payload_kg_per_n: by_force.tr_mul(&payload_by_disturbance).into(),
+            acceleration_m_s2_per_n: core::array::from_fn(|leg| weighted(&by_force.column(leg).into(), arm).norm()),
             by_force,
             force_by_disturbance: by_force.try_inverse().unwrap_or_default(),
         };
-        let sum = |effects: [f64; LEGS]| friction.force * effects.into_iter().map(f64::abs).sum::<f64>();
-        let of_one_leg = friction.force * friction.acceleration.into_iter().fold(f64::INFINITY, f64::min);
-        let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass)
-            .max(DEFAULT_PAYLOAD_CHANGE_PER_FRICTION * sum(friction.payload));
+        let sum = |effects: [f64; LEGS]| friction.force_n * effects.into_iter().map(f64::abs).sum::<f64>();
+        let of_one_leg = friction.force_n * friction.acceleration_m_s2_per_n.into_iter().fold(f64::INFINITY, f64::min);
+        let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass_kg)
+            .max(DEFAULT_PAYLOAD_CHANGE_PER_FRICTION * sum(friction.payload_kg_per_n));
         let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT
             * parameters.unscaled_limits().position.acceleration)
             .max(DEFAULT_IMPACT_PER_FRICTION * of_one_leg);
-        let softest = law.position.stiffness.min(law.orientation.stiffness);
+        let softest = law.position.kp_per_s2.min(law.orientation.kp_per_s2);
         let softness = (SWING_STIFFNESS / softest).max(1.0);
         let swing = (MIN_SWING_PEAK_TO_PEAK_M * softness * softness).min(MAX_SWING_M);
         let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step.unwrap_or(0.0) / softest;
@@ -152,7 +152,7 @@ impl DisturbanceBounds {
             } else {
                 f64::INFINITY
             },
-            max_sudden_disturbance: if expects_forces {
+            max_sudden_acceleration_m_s2: if expects_forces {
                 disturbance_step.unwrap_or(default_step)
             } else {
                 f64::INFINITY
@@ -267,7 +267,7 @@ impl DisturbanceMonitor {
         friction: &UnstatedFriction,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let bound = bounds.max_sudden_disturbance + self.removed_acceleration;
+        let bound = bounds.max_sudden_acceleration_m_s2 + self.removed_acceleration;
         let is_within = |sudden: &Vector6<f64>| bounds.norm_squared(sudden) <= bound * bound;
         if is_within(sudden) || is_within(&friction.unexplained(&bounds.friction, sudden)) {
             self.impact_s = 0.0;

@@ -49,7 +49,7 @@ pub(in crate::control) struct DriveResponse {
     since_start_s: f64,
     missing_s: f64,
     /// Change of the disturbance; 0 if the force of one leg explains it.
-    pub sudden_disturbance: Vector6<f64>,
+    pub sudden_acceleration: Vector6<f64>,
 }
 
 impl DriveResponse {
@@ -70,7 +70,7 @@ impl DriveResponse {
         let sent = Vector6::from(*sent);
         self.usual_force += (sent - self.usual_force) * share;
         let arm = constants.angle_weighting_radius_m();
-        self.sudden_disturbance = if is_starting { Vector6::zeros() } else { sudden };
+        self.sudden_acceleration = if is_starting { Vector6::zeros() } else { sudden };
         let sudden = weighted(&sudden, arm);
         if is_starting || sudden.norm_squared() < constants.least_missing_acceleration_squared {
             self.missing_s = 0.0;
@@ -105,7 +105,7 @@ impl DriveResponse {
             let force = along / square * if *sent < 0.0 { -1.0 } else { 1.0 };
             let explains = along * along >= least * square;
             if explains {
-                self.sudden_disturbance = Vector6::zeros();
+                self.sudden_acceleration = Vector6::zeros();
             }
             let bound =
                 (MIN_MISSING_PER_USUAL_FORCE * usual.abs()).max(MIN_MISSING_PER_MAX_FORCE * max_force);

@@ -55,8 +55,8 @@ impl ReadingErrors {
     /// Equal readings in a row that noise permits; `None` if the noise is less than a step or the step is
     /// unknown.
     fn max_equal_readings(&self) -> Option<f64> {
-        let steps = self.deviation / self.resolution;
-        (self.resolution > 0.0 && steps >= 1.0)
+        let steps = self.deviation_m / self.resolution_m;
+        (self.resolution_m > 0.0 && steps >= 1.0)
             .then(|| (MAX_EQUAL_AT_ONE_STEP / (steps * steps)).max(MAX_EQUAL_NOISY_READINGS))
     }
 }
@@ -65,12 +65,12 @@ impl ReadingErrors {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrozenLegBounds {
     /// Motion of the reference \[m\].
-    pub motion: f64,
+    pub motion_m: f64,
     /// Change of the feedback force on the leg \[N\], for a long run of equal readings while the reference
     /// has moved. Stiction may balance a smaller change.
-    pub force: f64,
+    pub force_n: f64,
     /// Change of the force on a leg that unstated friction may balance while the leg stands \[N\].
-    pub friction: f64,
+    pub friction_n: f64,
     /// Number of readings that make a run long.
     pub long: u32,
 }
@@ -78,11 +78,11 @@ pub struct FrozenLegBounds {
 impl FrozenLegBounds {
     /// Bounds of a loop with the stiffness Kp \[1/s^2\].
     pub fn new(stiffness: f64, actuator: &Actuator, period_s: f64) -> Self {
-        let friction = FRICTION_REVERSAL * actuator.friction_uncertainty;
+        let friction = FRICTION_REVERSAL * actuator.friction_uncertainty_n;
         Self {
-            motion: motion_bound(stiffness),
-            force: friction.max(STICTION_RATIO * actuator.max_force),
-            friction,
+            motion_m: motion_bound(stiffness),
+            force_n: friction.max(STICTION_RATIO * actuator.max_force_n),
+            friction_n: friction,
             long: (LONG_S / period_s) as u32,
         }
     }
@@ -167,8 +167,8 @@ impl FrozenSensors {
         one_leg: &FrozenLegBounds,
     ) -> Result<(), Diagnostic> {
         let are_all_equal = self.equal_readings.iter().all(|equal| *equal + 1 >= MIN_EQUAL_READINGS);
-        let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion };
-        let resolution = if errors.resolution > 0.0 { errors.resolution } else { self.largest_step() };
+        let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion_m };
+        let resolution = if errors.resolution_m > 0.0 { errors.resolution_m } else { self.largest_step() };
         let bound = (bound + resolution).max(MIN_BOUND_SENSOR_STEPS * resolution);
         let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * resolution);
         let mut result = Ok(());
@@ -181,16 +181,16 @@ impl FrozenSensors {
             let moved = (reference - *first).abs();
             let force = (force - *first_force).abs();
             let is_far = *equal + 1 >= MIN_EQUAL_READINGS && moved > bound;
-            if is_far && force >= one_leg.friction && result.is_ok() {
+            if is_far && force >= one_leg.friction_n && result.is_ok() {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, bound).at(leg));
             }
             let is_long = *equal >= one_leg.long && moved > least_motion;
-            if is_long && force > one_leg.force && result.is_ok() {
+            if is_long && force > one_leg.force_n && result.is_ok() {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, least_motion).at(leg));
             }
             let repeats = |most| f64::from(*equal + 1) > most;
             if errors.max_equal_readings().is_some_and(repeats) && result.is_ok() {
-                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution).at(leg));
+                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution_m).at(leg));
             }
         }
         result
@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     const BOUNDS: FrozenLegBounds =
-        FrozenLegBounds { motion: ONE_LEG_BOUND_M, force: 10.0, friction: 0.0, long: 50 };
+        FrozenLegBounds { motion_m: ONE_LEG_BOUND_M, force_n: 10.0, friction_n: 0.0, long: 50 };
 
     fn check(
         sensors: &mut FrozenSensors,
@@ -210,7 +210,7 @@ mod tests {
         [deviation, resolution]: [f64; 2],
         legs: [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
-        sensors.check(&length, &ReadingErrors { deviation, resolution }, &BOUNDS, || legs)
+        sensors.check(&length, &ReadingErrors { deviation_m: deviation, resolution_m: resolution }, &BOUNDS, || legs)
     }
 
     /// Readings of a crawling leg that does not move while the feedback force on it grows to `newtons`.

@@ -34,11 +34,11 @@ const REVERSAL: f64 = 2.4;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrictionEffects {
     /// Fu \[N\].
-    pub force: f64,
+    pub force_n: f64,
     /// Change of payload by a force of each leg \[kg/N\].
-    pub payload: [f64; LEGS],
+    pub payload_kg_per_n: [f64; LEGS],
     /// Largest acceleration that swings the platform by a force of one leg, its angles weighted \[m/s^2/N\].
-    pub acceleration: [f64; LEGS],
+    pub acceleration_m_s2_per_n: [f64; LEGS],
     /// b_i, in error coordinates, and the inverse.
     pub by_force: Matrix6<f64>,
     /// Forces of the legs that explain a disturbance.
@@ -83,8 +83,8 @@ impl UnstatedFriction {
 
     /// Least and largest change of payload that friction may explain \[kg\].
     pub fn payload_changes(&self, effects: &FrictionEffects) -> [f64; 2] {
-        let forces = self.forces(effects.force, &self.unusual);
-        forces.iter().zip(&effects.payload).fold([0.0; 2], |[least, most], ([low, high], effect)| {
+        let forces = self.forces(effects.force_n, &self.unusual);
+        forces.iter().zip(&effects.payload_kg_per_n).fold([0.0; 2], |[least, most], ([low, high], effect)| {
             let (low, high) = (low * effect, high * effect);
             [least + low.min(high), most + low.max(high)]
         })
@@ -95,7 +95,7 @@ impl UnstatedFriction {
     #[inline(never)]
     pub fn unexplained(&self, effects: &FrictionEffects, sudden: &Vector6<f64>) -> Vector6<f64> {
         let mut explained = effects.force_by_disturbance * sudden;
-        for (force, [low, high]) in explained.iter_mut().zip(self.forces(effects.force, &self.sudden)) {
+        for (force, [low, high]) in explained.iter_mut().zip(self.forces(effects.force_n, &self.sudden)) {
             // Not `clamp`, which may panic.
             *force = force.max(low).min(high);
         }
@@ -104,8 +104,8 @@ impl UnstatedFriction {
 
     /// Acceleration with which friction may swing the platform \[m/s^2\].
     pub fn swing_acceleration(&self, effects: &FrictionEffects) -> f64 {
-        let legs = self.unusual.iter().zip(&effects.acceleration);
-        effects.force * legs.map(|(share, effect)| share * effect).sum::<f64>()
+        let legs = self.unusual.iter().zip(&effects.acceleration_m_s2_per_n);
+        effects.force_n * legs.map(|(share, effect)| share * effect).sum::<f64>()
     }
 }
 
@@ -114,9 +114,9 @@ mod tests {
     use super::*;
 
     const EFFECTS: FrictionEffects = FrictionEffects {
-        force: 10.0,
-        payload: [0.1; LEGS],
-        acceleration: [0.2; LEGS],
+        force_n: 10.0,
+        payload_kg_per_n: [0.1; LEGS],
+        acceleration_m_s2_per_n: [0.2; LEGS],
         by_force: Matrix6::new(
             1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
             0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0,

@@ -64,7 +64,7 @@ use crate::control::reference::stop::constant_jerk::step_constant_jerk;
 use crate::control::reference::stop::held_stop::HeldStop;
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::setpoint::motion::{RelativeMotion, SetpointMotion};
-use crate::control::setpoint::target::{NOTABLY, Target, at_rest};
+use crate::control::setpoint::target::{NOTABLE_RATIO, Target, at_rest};
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::{Limit, LimitSet};
 use crate::control::signals::pair::Pair;
@@ -182,7 +182,7 @@ impl ReferenceGenerator {
     pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Refusal> {
         self.motion = *motion;
         self.bounds = PoseBounds::relaxed_to(constants, &motion.pose);
-        let step = Step { strength: self.strength, ..Step::default() };
+        let step = Step { strength_share: self.strength, ..Step::default() };
         let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
         // The strength of the next attempt. A platform at rest needs none.
         match verified {
@@ -190,14 +190,14 @@ impl ReferenceGenerator {
             Err(Refusal::Limit(Limit::Force)) => self.reduce_strength(),
             Err(_) => self.strength = (self.strength / STRENGTH_REDUCTION).min(1.0),
         }
-        self.stop.adopt(verified.unwrap_or(StopKind::BrakeAtOnce), step.strength);
+        self.stop.adopt(verified.unwrap_or(StopKind::BrakeAtOnce), step.strength_share);
         verified.map(drop)
     }
 
     /// Whether an acceleration is within the strength. Until it is, the stop brakes with more, whatever the
     /// strength: a further reduction would not help this proof, and only make later stops longer.
     fn does_strength_act(&self, constants: &Constants, present: &Acceleration) -> bool {
-        let limits = constants.parameters.limits.with_accelerations_scaled(NOTABLY * self.strength);
+        let limits = constants.parameters.limits.with_accelerations_scaled(NOTABLE_RATIO * self.strength);
         present.linear.norm() <= limits.position.acceleration
             && present.angular.norm() <= limits.orientation.acceleration
     }
@@ -318,7 +318,7 @@ impl ReferenceGenerator {
             step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
             let Self { strength, .. } = *self;
             let inner_speeds = inner_speeds(&begin, &self.motion, step_s);
-            let step = Step { from: Some(&begin.pose), duration: step_s, inner_speeds, effort, strength };
+            let step = Step { from: Some(&begin.pose), duration_s: step_s, inner_speeds, effort, strength_share: strength };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.proportional_steps_left = match verified {
@@ -378,13 +378,13 @@ impl ReferenceGenerator {
         let offset = Twist::from_vector(&offset);
         let orientation = TargetOffset {
             offset: offset.angular,
-            velocity: desired.twist.angular,
-            acceleration: desired.acceleration.angular,
+            target_velocity: desired.twist.angular,
+            target_acceleration: desired.acceleration.angular,
         };
         let position = TargetOffset {
             offset: offset.linear,
-            velocity: desired.twist.linear,
-            acceleration: desired.acceleration.linear,
+            target_velocity: desired.twist.linear,
+            target_acceleration: desired.acceleration.linear,
         };
         let approaches = Pair { angular: &turning, linear: &shifting };
         let ahead = Pair { angular: &led.angular, linear: &led.linear };

@@ -63,8 +63,8 @@ impl DriveMonitor {
             return Ok(());
         }
         self.check_ready(cycle, unready)?;
-        match drives.force.filter(|_| self.is_ready) {
-            Some(force) => self.check_force(cycle.constants.machine().actuator.max_force, &force, dt),
+        match drives.force_n.filter(|_| self.is_ready) {
+            Some(force) => self.check_force(cycle.constants.machine().actuator.max_force_n, &force, dt),
             None => Ok(()),
         }
     }

@@ -39,8 +39,8 @@ impl ExternalPose {
         let share = (dt / TIME_CONSTANT_S).min(1.0);
         self.time_ns = measurement.time_ns;
         let length = leg_lengths(constants.machine(), &TaskState::at_rest(x).motion().pose);
-        let bound = constants.parameters.pose_tolerance;
-        let pairs = self.difference.iter_mut().zip(measurement.length.iter().zip(&length));
+        let bound = constants.parameters.pose_tolerance_m;
+        let pairs = self.difference.iter_mut().zip(measurement.length_m.iter().zip(&length));
         let mut largest = (0.0, 0);
         for (leg, (difference, (measured, expected))) in pairs.enumerate() {
             *difference += (measured - expected - *difference) * share;

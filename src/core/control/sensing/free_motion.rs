@@ -52,7 +52,7 @@ impl Sample {
 
 /// Bound on the speed of a joint \[m/s\].
 fn speed(constants: &Constants, twist: &Twist) -> f64 {
-    twist.linear.norm() + constants.arm * twist.angular.norm()
+    twist.linear.norm() + constants.arm_m * twist.angular.norm()
 }
 
 /// The last measurements without force.
@@ -93,12 +93,12 @@ impl FreeMotion {
         if measurement.time_ns >= self.held_until_ns && is_new {
             self.newest_ns = Some(measurement.time_ns);
             self.standstill.add(&constants.parameters, constants.rest_window_s, measurement);
-            let new = measurement.rate.is_some().then(|| Sample::new(constants, located));
+            let new = measurement.rate_m_s.is_some().then(|| Sample::new(constants, located));
             (self.before, self.last) = (new.and(self.last), new);
         }
         match self.at(constants, begin_ns) {
             Some(motion) => Ok(motion),
-            None if measurement.rate.is_some() => Err(DiagnosticCode::PlatformMoving.into()),
+            None if measurement.rate_m_s.is_some() => Err(DiagnosticCode::PlatformMoving.into()),
             None => self.at_rest(constants, localization, &located.platform.pose),
         }
     }
@@ -113,8 +113,8 @@ impl FreeMotion {
         let largest = standing_speed(&constants.parameters);
         let found = self.standstill.latest();
         let speed = found.map_or(f64::INFINITY, |rates| {
-            let twist = localization.twist_of(constants, &rates.rate.into());
-            twist.map_or(f64::INFINITY, |twist| speed(constants, &twist) + rates.uncertainty)
+            let twist = localization.twist_of(constants, &rates.rate_m_s.into());
+            twist.map_or(f64::INFINITY, |twist| speed(constants, &twist) + rates.uncertainty_m_s)
         });
         if self.standstill.rates().is_some() && speed <= largest {
             let (twist, acceleration) = (Twist::default(), Acceleration::default());

@@ -117,7 +117,7 @@ pub(in crate::control) fn check_stroke(
     code: DiagnosticCode,
     length: &[f64; LEGS],
 ) -> Result<(), Diagnostic> {
-    let (shortest, longest) = (actuator.min_length - tolerance, actuator.max_length + tolerance);
+    let (shortest, longest) = (actuator.min_length_m - tolerance, actuator.max_length_m + tolerance);
     for (leg, length) in length.iter().enumerate() {
         if *length >= shortest && *length <= longest {
             continue;

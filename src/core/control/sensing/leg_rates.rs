@@ -22,13 +22,13 @@ pub(in crate::control) struct LegRateEstimator {
 impl LegRateEstimator {
     /// Leg rates at the instant of a measurement, measured or estimated \[m/s\].
     pub fn rates(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
-        measurement.rate.unwrap_or_else(|| self.estimated(constants, measurement))
+        measurement.rate_m_s.unwrap_or_else(|| self.estimated(constants, measurement))
     }
 
     #[inline(never)]
     fn estimated(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
         let time_ns = measurement.time_ns;
-        let measured = ErrorCoordinates { value: Vector6::from(measurement.length), rate: Vector6::zeros() };
+        let measured = ErrorCoordinates { value: Vector6::from(measurement.length_m), rate: Vector6::zeros() };
         let elapsed_s = |filter: &KalmanFilter| seconds_between(filter.time_ns, time_ns);
         let filter = match &mut self.filter {
             Some(filter) if (0.0..MAX_GAP_S).contains(&elapsed_s(filter)) => filter,

@@ -44,14 +44,14 @@ pub struct PlatformState {
     /// Condition of the pose, see [`crate::model::sensitivity`].
     pub condition: f64,
     /// Time to a singular pose if the motion continues \[s\]; infinite if it leads to none.
-    pub time_to_singularity: f64,
+    pub time_to_singularity_s: f64,
 }
 
 /// A measurement with the state of the platform computed from it.
 pub(in crate::control) struct Located<'a> {
     pub measurement: &'a Measurement,
     /// Rates of the legs, measured or estimated \[m/s\].
-    pub rate: [f64; LEGS],
+    pub rate_m_s: [f64; LEGS],
     pub platform: PlatformState,
 }
 
@@ -98,14 +98,14 @@ impl Localization {
         let Cycle { constants, state, .. } = *cycle;
         let (machine, parameters) = (constants.machine(), &constants.parameters);
         if let Some(x) = measurement.pose.as_ref().filter(|_| !state.has_control()) {
-            self.follow_external(constants, x, &measurement.length);
+            self.follow_external(constants, x, &measurement.length_m);
         }
         let start = *self.tracker.pose();
         let start_length = self.tracker.kinematic_state().lengths(machine);
-        let mut tracked = self.tracker.advance(machine, &measurement.length).0;
+        let mut tracked = self.tracker.advance(machine, &measurement.length_m).0;
         for _ in 1..if state.has_control() { MAX_NEWTON_STEPS_PER_CYCLE } else { 1 } {
             if tracked == TrackingResult::Approaching {
-                tracked = self.tracker.advance(machine, &measurement.length).0;
+                tracked = self.tracker.advance(machine, &measurement.length_m).0;
             }
         }
         let is_uncertain = self.is_tracked_from_home
@@ -119,7 +119,7 @@ impl Localization {
         match tracked {
             TrackingResult::Found => self.is_tracked_from_home = true,
             TrackingResult::Approaching if state.has_control() => {
-                return Err(self.jump_diagnostic(constants, &start_length, &measurement.length));
+                return Err(self.jump_diagnostic(constants, &start_length, &measurement.length_m));
             }
             TrackingResult::Approaching => return Err(DiagnosticCode::FindingPose.into()),
             TrackingResult::NotConverged => {
@@ -135,8 +135,8 @@ impl Localization {
         let pose = *self.tracker.pose();
         Ok(Located {
             measurement,
-            rate,
-            platform: PlatformState { pose, twist, condition, time_to_singularity },
+            rate_m_s: rate,
+            platform: PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity },
         })
     }
 
@@ -178,7 +178,7 @@ impl Localization {
     #[inline(never)]
     fn follow_external(&mut self, constants: &Constants, x: &[f64; 6], length: &[f64; LEGS]) {
         let (machine, pose) = (constants.machine(), TaskState::at_rest(*x).motion().pose);
-        let fits = |(one, other): (&f64, &f64)| (one - other).abs() <= constants.parameters.pose_tolerance;
+        let fits = |(one, other): (&f64, &f64)| (one - other).abs() <= constants.parameters.pose_tolerance_m;
         let trusted_step = self.tracker.kinematic_state().sensitivity().trusted_step;
         if machine.joints.distance(self.tracker.pose(), &pose) > trusted_step
             && leg_lengths(machine, &pose).iter().zip(length).all(fits)
@@ -236,5 +236,5 @@ impl Localization {
 }
 
 fn assembly_mode_condition_bound(parameters: &Parameters) -> f64 {
-    parameters.condition.min(MAX_CERTAIN_CONDITION)
+    parameters.max_condition.min(MAX_CERTAIN_CONDITION)
 }

@@ -69,7 +69,7 @@ impl RateConsistency {
         }
         let mut next = *self;
         let rates = now_rate.iter().zip(before_rate);
-        let lengths = now.length.iter().zip(&before.length);
+        let lengths = now.length_m.iter().zip(&before.length_m);
         for ((residual, travel), ((now, before), (rate, rate_before))) in
             next.residual.iter_mut().zip(&mut next.travel).zip(lengths.zip(rates))
         {
@@ -194,10 +194,10 @@ fn check_measurement(
 ) -> Result<(), Diagnostic> {
     let actuator = &cycle.constants.machine().actuator;
     let not_finite = |values: &[f64; LEGS]| values.iter().position(|value| !value.is_finite());
-    if let Some(leg) = not_finite(&now.length).or_else(|| now.rate.as_ref().and_then(not_finite)) {
+    if let Some(leg) = not_finite(&now.length_m).or_else(|| now.rate_m_s.as_ref().and_then(not_finite)) {
         return Err(Diagnostic::from(DiagnosticCode::MeasurementNotFinite).at(leg));
     }
-    check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
+    check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length_m)?;
     let Some(before) = before else {
         *consistency = RateConsistency::default();
         return Ok(());
@@ -207,9 +207,9 @@ fn check_measurement(
         return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
     }
     let noise = PLAUSIBLE_LENGTH_CHANGE_RATIO * actuator.stroke();
-    let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
-    check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
-    match (&now.rate, &before.rate) {
+    let bound = LEG_RATE_FACTOR * actuator.max_rate_m_s * dt.min(window_s) + noise;
+    check_change(DiagnosticCode::MeasurementJumped, &now.length_m, &before.length_m, bound)?;
+    match (&now.rate_m_s, &before.rate_m_s) {
         (Some(rate), Some(before_rate)) => check_rate_jump_and_consistency(
             cycle,
             [now, before],
@@ -236,11 +236,11 @@ fn check_rate_jump_and_consistency(
     let limits = cycle.constants.parameters.unscaled_limits();
     let acceleration =
         MIN_ACCELERATION_BOUND_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
-    let bound = acceleration * bounded_dt_s + PLAUSIBLE_RATE_CHANGE_RATIO * actuator.max_rate;
+    let bound = acceleration * bounded_dt_s + PLAUSIBLE_RATE_CHANGE_RATIO * actuator.max_rate_m_s;
     check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
     let updated = consistency.updated(now, before, [rate, before_rate]);
     // J dt^3 / 12 per step, times the steps within the time constant.
-    let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
+    let jerk = limits.position.jerk + cycle.constants.arm_m * limits.orientation.jerk;
     updated.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * bounded_dt_s.powi(2) / 12.0)?;
     *consistency = updated;
     Ok(())

@@ -50,7 +50,7 @@ pub(in crate::control) fn standing_speed(parameters: &Parameters) -> f64 {
 /// With n = T / period measurements, evenly spread, the deviation of the slope is `s sqrt(12 / n) / T`.
 pub(in crate::control) fn window_s(parameters: &Parameters) -> f64 {
     let allowed = NOISE_SHARE * standing_speed(parameters) / DEVIATIONS;
-    let needed = parameters.reading_errors.deviation * (12.0 * parameters.period_s()).sqrt() / allowed;
+    let needed = parameters.reading_errors.deviation_m * (12.0 * parameters.period_s()).sqrt() / allowed;
     libm::cbrt(needed * needed).max(MIN_WINDOW_S)
 }
 
@@ -58,9 +58,9 @@ pub(in crate::control) fn window_s(parameters: &Parameters) -> f64 {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control) struct WindowRates {
     /// Rate of each leg \[m/s\].
-    pub rate: [f64; LEGS],
+    pub rate_m_s: [f64; LEGS],
     /// Bound on the error of any leg's rate \[m/s\].
-    pub uncertainty: f64,
+    pub uncertainty_m_s: f64,
     /// Largest standard deviation of the lengths from their lines \[m\].
     scatter: f64,
 }
@@ -82,7 +82,7 @@ struct Window {
 impl Window {
     fn new(measurement: &Measurement) -> Self {
         let zeros = [0.0; LEGS];
-        let (first_ns, first) = (measurement.time_ns, measurement.length);
+        let (first_ns, first) = (measurement.time_ns, measurement.length_m);
         Self { first_ns, first, last_s: 0.0, count: 1, t: 0.0, t_t: 0.0, l: zeros, t_l: zeros, l_l: zeros }
     }
 
@@ -112,7 +112,7 @@ impl Window {
             most = most.max(l_l - l * l / n - *rate * common);
         }
         let scatter = (most / (n - 2.0)).sqrt();
-        Some(WindowRates { rate, uncertainty: DEVIATIONS * scatter / spread.sqrt(), scatter })
+        Some(WindowRates { rate_m_s: rate, uncertainty_m_s: DEVIATIONS * scatter / spread.sqrt(), scatter })
     }
 }
 
@@ -132,7 +132,7 @@ impl Standstill {
             return;
         };
         let t = seconds_between(window.first_ns, measurement.time_ns);
-        let mut away = measurement.length;
+        let mut away = measurement.length_m;
         away.iter_mut().zip(&window.first).for_each(|(length, first)| *length -= first);
         window.add(t, &away);
         let moved = away.iter().fold(0.0_f64, |most, away| most.max(away.abs()));
@@ -140,7 +140,7 @@ impl Standstill {
             moved
                 > SCATTER_DEVIATIONS * rates.scatter
                     + standing_speed(parameters) * t
-                    + parameters.reading_errors.resolution
+                    + parameters.reading_errors.resolution_m
         }) {
             (self.window, self.rates) = (Some(Window::new(measurement)), None);
         } else if t >= window_s {

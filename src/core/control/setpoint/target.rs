@@ -30,7 +30,7 @@ pub enum Target<'a> {
 const MIN_TARGET_SPEED: f64 = 0.01;
 
 /// Ratio from which an acceleration is beyond a limit by more than rounding.
-pub(in crate::control) const NOTABLY: f64 = 1.1;
+pub(in crate::control) const NOTABLE_RATIO: f64 = 1.1;
 
 impl<'a> Target<'a> {
     /// Target that a valid setpoint requests.
@@ -39,7 +39,7 @@ impl<'a> Target<'a> {
         if setpoint.setpoint.kind == SetpointKind::Pose {
             Self::Samples(samples)
         } else if setpoint.setpoint.kind == SetpointKind::Target {
-            Self::Pose { pose: &setpoint.motion.pose, speed_share: share(setpoint.setpoint.target_speed) }
+            Self::Pose { pose: &setpoint.motion.pose, speed_share: share(setpoint.setpoint.target_speed_share) }
         } else {
             Self::Motion(setpoint)
         }
@@ -99,7 +99,7 @@ impl<'a> Target<'a> {
         ] {
             share.velocity *= strength.sqrt();
             share.acceleration = share.acceleration.min(strong.acceleration);
-            let notable = NOTABLY * share.acceleration;
+            let notable = NOTABLE_RATIO * share.acceleration;
             if present.norm_squared() > notable * notable {
                 share.jerk = strong.jerk;
             }
@@ -132,7 +132,7 @@ mod tests {
             [(0.0, 1.0), (0.25, 0.25), (1.0, 1.0), (2.0, 1.0), (1e-300, 0.01), (-1.0, 1.0), (f64::NAN, 1.0)]
         {
             for (kind, scale) in [(SetpointKind::Target, 0.5 * share), (SetpointKind::Motion, 1.0)] {
-                let setpoint = Setpoint { kind, target_speed, ..Setpoint::default() };
+                let setpoint = Setpoint { kind, target_speed_share: target_speed, ..Setpoint::default() };
                 let (setpoint, samples) = (SetpointMotion::new(setpoint), PoseSamples::default());
                 let target = Target::of_setpoint(&setpoint, &samples);
                 let found = target.limits(&limits, 1.0, &Acceleration::default());

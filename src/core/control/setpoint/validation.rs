@@ -311,10 +311,10 @@ fn check_legs(
     let actuator = &machine.actuator;
     let (lengths, rates) = leg_lengths_and_rates(machine, &motion.pose, &motion.twist);
     for (leg, rate) in rates.iter().enumerate() {
-        let ratio = rate.abs() / actuator.max_rate;
+        let ratio = rate.abs() / actuator.max_rate_m_s;
         if !active.check(Limit::LegRate, ratio) {
             return Err(Diagnostic::new(DiagnosticCode::SetpointTooFast, ratio, 1.0).at(leg));
         }
     }
-    check_stroke(actuator, -parameters.stroke_margin, DiagnosticCode::SetpointOutOfReach, &lengths)
+    check_stroke(actuator, -parameters.stroke_margin_m, DiagnosticCode::SetpointOutOfReach, &lengths)
 }

@@ -48,13 +48,13 @@ pub struct Setpoint {
     /// X, X', X'' at that instant.
     pub task: TaskState,
     /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 means 1.
-    pub target_speed: f64,
+    pub target_speed_share: f64,
 }
 
 impl Setpoint {
     /// X, X' and X'' of a motion at an instant.
     pub fn motion(time_ns: u64, task: TaskState) -> Self {
-        Self { kind: SetpointKind::Motion, time_ns, task, target_speed: 0.0 }
+        Self { kind: SetpointKind::Motion, time_ns, task, target_speed_share: 0.0 }
     }
 }
 
@@ -64,9 +64,9 @@ pub struct Measurement {
     /// Instant of the measurement, on the clock of the releases \[ns\].
     pub time_ns: u64,
     /// Measured leg lengths L, from base joint to platform joint \[m\].
-    pub length: [f64; LEGS],
+    pub length_m: [f64; LEGS],
     /// Measured leg rates L' \[m/s\]; `None` if the driver does not measure them.
-    pub rate: Option<[f64; LEGS]>,
+    pub rate_m_s: Option<[f64; LEGS]>,
     /// X by another sensor at the same instant; `None` if there is none.
     pub pose: Option<[f64; 6]>,
     /// Status of the drives.
@@ -89,7 +89,7 @@ pub struct DriveStatus {
     /// Set of drives with a fault, and [`DriveStatus::BUS_FAILED`]; `None` if not reported.
     pub fault: Option<u32>,
     /// Actual forces \[N\]; `None` if not reported.
-    pub force: Option<[f64; LEGS]>,
+    pub force_n: Option<[f64; LEGS]>,
 }
 
 impl DriveStatus {

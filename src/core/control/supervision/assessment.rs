@@ -59,7 +59,7 @@ pub(in crate::control) fn assess(
     near_since_ns: &mut Option<u64>,
 ) -> Findings {
     let Evidence { setpoint, localization: located, is_ready, .. } = evidence;
-    let conditioned = localization.check_condition(cycle.constants.parameters.condition, active_limits);
+    let conditioned = localization.check_condition(cycle.constants.parameters.max_condition, active_limits);
     let tracking = match cycle.state.has_control() {
         true => check_tracking(cycle, evidence, &conditioned, active_limits),
         false => conditioned,
@@ -221,8 +221,8 @@ fn check_following_error(
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
     let Some(PoseError { pose, twist }) = error else { return Ok(()) };
-    let Parameters { following_position, following_orientation, .. } = parameters;
-    let Parameters { following_velocity, following_angular_velocity, .. } = parameters;
+    let Parameters { following_position_m: following_position, following_orientation_rad: following_orientation, .. } = parameters;
+    let Parameters { following_velocity_m_s: following_velocity, following_angular_velocity_rad_s: following_angular_velocity, .. } = parameters;
     let ratio =
         largest_ratio([pose.linear.norm() / following_position, pose.angular.norm() / following_orientation]);
     if !active.check(Limit::Following, ratio) {

@@ -193,7 +193,7 @@ fn each_finding_alone_prevents_control() {
 fn control_begins_on_a_motion_within_the_tolerance_and_on_any_target() {
     let machine = machine(&mut RandomVectors::new(61));
     let law = parameters(&machine).law;
-    let (shift, turn) = (law.position.stiffness.sqrt(), law.orientation.stiffness.sqrt());
+    let (shift, turn) = (law.position.kp_per_s2.sqrt(), law.orientation.kp_per_s2.sqrt());
     for (part, wn) in [(0, 1.0), (1, 1.0), (2, shift), (3, turn)] {
         for kind in [SetpointKind::Motion, SetpointKind::Target] {
             let found = |share: f64| {
@@ -241,8 +241,8 @@ fn a_start_near_a_singular_pose_is_refused_as_such() {
     let (pose, condition) = (*constants.home.pose(), constants.home.sensitivity().condition);
     let cycle = Cycle { constants: &constants, release_ns: 0, state: State::Standby };
     let (measurement, twist) = (Measurement::default(), Twist::default());
-    let platform = PlatformState { pose, twist, condition, time_to_singularity: f64::INFINITY };
-    let located = Ok(Located { measurement: &measurement, rate: [0.0; LEGS], platform });
+    let platform = PlatformState { pose, twist, condition, time_to_singularity_s: f64::INFINITY };
+    let located = Ok(Located { measurement: &measurement, rate_m_s: [0.0; LEGS], platform });
     let mut reference = ReferenceGenerator::new(&constants);
     let motion = Motion { pose, twist, acceleration: Acceleration::default() };
     let start = verify_start(&cycle, &Localization::new(&constants), &mut reference, &located, Ok(motion));

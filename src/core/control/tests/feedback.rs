@@ -8,7 +8,7 @@ fn constants(mode: ControlMode) -> Constants {
     let machine = machine(&mut RandomVectors::new(41));
     let mut parameters = parameters(&machine);
     parameters.law.mode = mode;
-    parameters.law.max_compensated_disturbance = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
+    parameters.law.max_compensated_acceleration = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
     Constants::new(&machine, parameters)
 }
 
@@ -49,7 +49,7 @@ fn feedback_keeps_its_direction_and_takes_the_largest_share_within_the_bound() {
 #[test]
 fn feedback_on_legs_is_scaled_by_the_leg_that_exceeds_its_bound_most() {
     let constants = constants(ControlMode::JointPd);
-    let acceleration = LIMITS.position.acceleration + constants.arm * LIMITS.orientation.acceleration;
+    let acceleration = LIMITS.position.acceleration + constants.arm_m * LIMITS.orientation.acceleration;
     let bounds = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0).map(|saturation| 1.5 * acceleration + saturation);
     for leg in 0..LEGS {
         for (ratio, is_saturated) in [(0.999, false), (-0.999, false), (1.001, true), (-4.0, true)] {

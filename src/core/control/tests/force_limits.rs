@@ -24,7 +24,7 @@ fn beyond_a_limit_all_legs_lose_the_same_share_of_what_is_not_weight_or_of_the_c
     let motion = at_rest(constants.home.pose());
     let weight = constants.dynamics.forces::<Gravity>(&motion).unwrap();
     let transmission = Transmission::of_motion(&machine, &motion);
-    let limit = machine.actuator.max_force;
+    let limit = machine.actuator.max_force_n;
     let (mut cut, mut slowed) = (0, 0);
     for k in 0..2000 {
         let size = limit * 3.0 * samples.uniform();
@@ -37,27 +37,27 @@ fn beyond_a_limit_all_legs_lose_the_same_share_of_what_is_not_weight_or_of_the_c
         assert_eq!(is_cut, largest(&wanted) > limit, "{k}");
         if is_cut {
             cut += 1;
-            let (share, deviation) = share(&limited.command, &wanted, &weight);
+            let (share, deviation) = share(&limited.command_n, &wanted, &weight);
             assert!((0.0..1.0).contains(&share) && deviation < 1e-9, "{k}: {share} {deviation}");
-            assert!((largest(&limited.command) - limit).abs() < 1e-9 * limit, "{k}: more is lost");
+            assert!((largest(&limited.command_n) - limit).abs() < 1e-9 * limit, "{k}: more is lost");
         } else {
-            assert_eq!(limited.command, wanted);
+            assert_eq!(limited.command_n, wanted);
         }
-        let before = limited.command;
+        let before = limited.command_n;
         let next =
             before.map(|force| (force + 0.3 * limit * (2.0 * samples.uniform() - 1.0)).clamp(-limit, limit));
         let cycle = Cycle { state: State::Active, ..cycle };
         limiter.limit(&cycle, &next, (&motion, &transmission), &mut limited).unwrap();
-        let most = constants.parameters.force_rate * 1e-3;
-        let step = core::array::from_fn(|leg| limited.command[leg] - before[leg]);
+        let most = constants.parameters.force_rate_n_s * 1e-3;
+        let step = core::array::from_fn(|leg| limited.command_n[leg] - before[leg]);
         assert!(largest(&step) <= most * (1.0 + 1e-9), "{k}");
         if limited.active_limits.contains(Limit::ForceRate) {
             slowed += 1;
-            let (share, deviation) = share(&limited.command, &next, &before);
+            let (share, deviation) = share(&limited.command_n, &next, &before);
             assert!((0.0..1.0).contains(&share) && deviation < 1e-9, "{k}: {share} {deviation}");
             assert!(largest(&step) > most * (1.0 - 1e-9), "{k}: no slower than it must be");
         } else {
-            assert_eq!(limited.command, next);
+            assert_eq!(limited.command_n, next);
         }
     }
     assert!((500..1900).contains(&cut) && slowed > 200, "{cut} {slowed}");

@@ -17,7 +17,7 @@ fn update(
     measured: Option<(u64, f64)>,
 ) -> Option<Motion> {
     let (time_ns, speed) = measured.unwrap_or_default();
-    let measurement = Measurement { time_ns, rate: Some([0.0; LEGS]), ..Measurement::default() };
+    let measurement = Measurement { time_ns, rate_m_s: Some([0.0; LEGS]), ..Measurement::default() };
     let twist = Twist { linear: Vector3::x() * speed, ..Twist::default() };
     let pose = *constants.home.pose();
     let located = located(&measurement, pose, twist);
@@ -104,7 +104,7 @@ fn by_lengths(away: impl Fn(u64) -> f64, milliseconds: u64) -> Vec<Result<Motion
     let mut free = FreeMotion::default();
     let of = |ms: u64| {
         let length = home.map(|length| length + away(ms));
-        let measurement = Measurement { time_ns: ms * MS, length, ..Measurement::default() };
+        let measurement = Measurement { time_ns: ms * MS, length_m: length, ..Measurement::default() };
         // The twist from the filter of rates must not be used.
         let twist = Twist { linear: Vector3::x(), ..Twist::default() };
         let pose = *constants.home.pose();

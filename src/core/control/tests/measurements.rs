@@ -29,7 +29,7 @@ impl Bench {
     /// Bench after a first cycle at home, with the same rate for every leg.
     fn begun(state: State, rate: Option<f64>) -> Self {
         let mut bench = Self::new(state);
-        let first = Measurement { rate: rate.map(|rate| [rate; LEGS]), ..bench.at(0, 0.0) };
+        let first = Measurement { rate_m_s: rate.map(|rate| [rate; LEGS]), ..bench.at(0, 0.0) };
         assert_eq!(bench.validate(0, Some(&first)), Ok(first.time_ns));
         bench
     }
@@ -37,7 +37,7 @@ impl Bench {
     /// Measurement in which every leg is longer than at home.
     fn at(&self, after_ns: u64, longer: f64) -> Measurement {
         let length = self.home.map(|length| length + longer);
-        Measurement { time_ns: START_NS + after_ns, length, ..Measurement::default() }
+        Measurement { time_ns: START_NS + after_ns, length_m: length, ..Measurement::default() }
     }
 
     /// Time stamp of the valid measurement in a cycle.
@@ -61,14 +61,14 @@ impl Bench {
 #[test]
 fn the_first_measurement_is_finite_within_the_stroke_and_recent() {
     let machine = machine(&mut RandomVectors::new(71));
-    let Actuator { min_length, max_length, .. } = machine.actuator;
+    let Actuator { min_length_m: min_length, max_length_m: max_length, .. } = machine.actuator;
     let tolerance = 0.02 * machine.actuator.stroke();
     for leg in 0..LEGS {
         for (end, sign) in [(min_length, -1.0), (max_length, 1.0)] {
             let refused = |share: f64| {
                 Bench::first(|bench| {
                     let mut new = bench.at(0, 0.0);
-                    new.length[leg] = end + sign * share * tolerance;
+                    new.length_m[leg] = end + sign * share * tolerance;
                     new
                 })
             };
@@ -77,8 +77,8 @@ fn the_first_measurement_is_finite_within_the_stroke_and_recent() {
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for is_rate in [false, true] {
                 let mut bench = Bench::new(State::Standby);
-                let mut new = Measurement { rate: Some([0.0; LEGS]), ..bench.at(0, 0.0) };
-                let numbers = if is_rate { new.rate.as_mut().unwrap() } else { &mut new.length };
+                let mut new = Measurement { rate_m_s: Some([0.0; LEGS]), ..bench.at(0, 0.0) };
+                let numbers = if is_rate { new.rate_m_s.as_mut().unwrap() } else { &mut new.length_m };
                 numbers[leg] = value;
                 let expected = Diagnostic::from(DiagnosticCode::MeasurementNotFinite).at(leg);
                 assert_eq!(bench.validate(0, Some(&new)).err(), Some(expected), "{value} {is_rate}");
@@ -137,7 +137,7 @@ fn rejected_measurements_do_not_widen_the_plausible_change() {
             let mut bench = Bench::begun(State::Active, is_rate.then_some(0.0));
             for k in 1..5 {
                 let mut far = bench.at(k * MS, 0.5);
-                far.rate = is_rate.then_some([0.0; LEGS]);
+                far.rate_m_s = is_rate.then_some([0.0; LEGS]);
                 assert!(!is_disturbed || !bench.accepts(k * MS, &far));
             }
             // A change that five cycles allow, and one that two cycles allow.
@@ -145,7 +145,7 @@ fn rejected_measurements_do_not_widen_the_plausible_change() {
             for (seconds, is_accepted) in [(4.5e-3, !is_disturbed), (1.9e-3, true)] {
                 let mut new =
                     bench.at(5 * MS, if is_rate { 2.5e-3 * change(seconds) } else { change(seconds) });
-                new.rate = is_rate.then_some([change(seconds); LEGS]);
+                new.rate_m_s = is_rate.then_some([change(seconds); LEGS]);
                 let mut bench = Bench { validator: bench.validator, constants: constants(), ..bench };
                 assert_eq!(bench.accepts(5 * MS, &new), is_accepted, "{is_rate} {is_disturbed} {seconds}");
             }
@@ -173,7 +173,7 @@ fn rates_change_no_faster_than_a_drive_accelerates_and_are_those_of_the_lengths(
         for (share, is_accepted) in [(0.99, true), (1.01, false)] {
             let mut bench = Bench::begun(State::Active, Some(0.0));
             let rate = sign * share * bound;
-            let new = Measurement { rate: Some([rate; LEGS]), ..bench.at(MS, 0.5 * rate * 1e-3) };
+            let new = Measurement { rate_m_s: Some([rate; LEGS]), ..bench.at(MS, 0.5 * rate * 1e-3) };
             assert_eq!(bench.accepts(MS, &new), is_accepted, "{sign} {share}");
         }
         // Lengths that do not move despite their rates, then lengths that move at their rates.
@@ -182,7 +182,7 @@ fn rates_change_no_faster_than_a_drive_accelerates_and_are_those_of_the_lengths(
             let mut bench = Bench::begun(State::Active, Some(rate));
             let refused = (1..60).find(|k| {
                 let way = if is_consistent { rate * (*k as f64) * 1e-3 } else { 0.0 };
-                let new = Measurement { rate: Some([rate; LEGS]), ..bench.at(k * MS, way) };
+                let new = Measurement { rate_m_s: Some([rate; LEGS]), ..bench.at(k * MS, way) };
                 !bench.accepts(k * MS, &new)
             });
             assert_eq!(refused.is_none(), is_consistent, "{sign}: {refused:?}");

@@ -70,36 +70,36 @@ pub(in crate::control) fn machine(samples: &mut RandomVectors) -> Machine {
     let platform: [Vector3<f64>; LEGS] = ring(0.8, core::f64::consts::FRAC_PI_3, 0.2);
     let home = Pose { rotation: Matrix3::identity(), position: Vector3::new(0.0, 0.0, 1.5) };
     let link = Link {
-        mass: 10.0,
-        center_of_mass: 0.4,
-        axial_inertia: 0.1,
-        transverse_inertia: TransverseInertia { constant: 1.0, quadratic: 0.0, reference_length: 0.0 },
+        mass_kg: 10.0,
+        center_of_mass_m: 0.4,
+        axial_inertia_kg_m2: 0.1,
+        transverse_inertia: TransverseInertia { constant_kg_m2: 1.0, quadratic_kg: 0.0, reference_length_m: 0.0 },
     };
     Machine {
-        gravity: Vector3::new(0.0, 0.0, -9.81),
+        gravity_m_s2: Vector3::new(0.0, 0.0, -9.81),
         platform: Platform {
-            mass: 200.0,
-            center_of_mass: Vector3::zeros(),
+            mass_kg: 200.0,
+            center_of_mass_m: Vector3::zeros(),
             inertia: Matrix3::identity() * 40.0,
         },
         joints: Joints::new(&base, &platform, &[Vector3::y(); LEGS], &home),
         cylinder: link.clone(),
         rod: link,
         actuator: Actuator {
-            min_length: 0.9,
-            max_length: 2.6,
-            max_rate: 1.0,
-            max_force: 1e4,
-            reflected_mass: 0.0,
-            viscous_friction: [0.0; LEGS],
-            coulomb_friction: [0.0; LEGS],
-            load_friction: [0.0; LEGS],
+            min_length_m: 0.9,
+            max_length_m: 2.6,
+            max_rate_m_s: 1.0,
+            max_force_n: 1e4,
+            reflected_mass_kg: 0.0,
+            viscous_friction_n_s_m: [0.0; LEGS],
+            coulomb_friction_n: [0.0; LEGS],
+            load_friction_share: [0.0; LEGS],
             force_scale: [1.0; LEGS],
-            friction_uncertainty: 0.0,
-            coulomb_smoothing: Actuator::COULOMB_SMOOTHING_M_S,
+            friction_uncertainty_n: 0.0,
+            coulomb_smoothing_m_s: Actuator::COULOMB_SMOOTHING_M_S,
         },
         home: [0.0, 0.0, 0.0, 0.0, 0.0, 1.5],
-        max_rotation: 0.5,
+        max_rotation_rad: 0.5,
         level: at_most_256_bits(fearless_simd::Level::new()),
     }
 }
@@ -124,27 +124,27 @@ pub(in crate::control) fn parameters(machine: &Machine) -> Parameters {
         limits_scale: 1.0,
         approach: false,
         envelope: None,
-        condition: 60.0,
-        force_rate: 1e6,
+        max_condition: 60.0,
+        force_rate_n_s: 1e6,
         on_violation: ViolationPolicy::Stop,
         feedback_scale: 0.5,
         payload_change_kg: None,
-        disturbance_step: None,
-        stroke_margin: 0.0,
-        following_velocity: 0.3,
-        following_angular_velocity: 0.3,
+        disturbance_step_m_s2: None,
+        stroke_margin_m: 0.0,
+        following_velocity_m_s: 0.3,
+        following_angular_velocity_rad_s: 0.3,
         after_loss: AfterStop::default(),
         lost_hold_ns: 10_000_000_000,
         holds_on_return: false,
-        engage_position: 0.01,
-        engage_orientation: 0.01,
-        following_position: 0.05,
-        following_orientation: 0.05,
+        engage_position_m: 0.01,
+        engage_orientation_rad: 0.01,
+        following_position_m: 0.05,
+        following_orientation_rad: 0.05,
         setpoint_timeout_ns: 20_000_000,
         measured_timeout_ns: 10_000_000,
         max_age_at_arrival_ns: 10_000_000,
         ready_timeout_ns: 500_000_000,
-        pose_tolerance: 5e-4,
+        pose_tolerance_m: 5e-4,
         longest_cycle_gap_ns: 10_000_000,
     }
 }
@@ -157,8 +157,8 @@ pub(in crate::control) fn random_constants(samples: &mut RandomVectors) -> Const
 
 /// Platform at a pose, far from singular ones, by a measurement.
 pub(in crate::control) fn located(measurement: &Measurement, pose: Pose, twist: Twist) -> Located<'_> {
-    let platform = PlatformState { pose, twist, condition: 2.0, time_to_singularity: f64::INFINITY };
-    Located { measurement, rate: [0.0; LEGS], platform }
+    let platform = PlatformState { pose, twist, condition: 2.0, time_to_singularity_s: f64::INFINITY };
+    Located { measurement, rate_m_s: [0.0; LEGS], platform }
 }
 
 /// Pose around home. The legs are within the stroke, and the condition is below the reference's limit.

@@ -100,7 +100,7 @@ fn solved<S: Simd>(
     starts: &[Pose; LANES],
     lengths: &[[f64; LEGS]; LANES],
 ) -> ([Pose; LANES], [bool; LANES]) {
-    let linear_weight = f64x8::splat(simd, 1.0 / square(joints.radius));
+    let linear_weight = f64x8::splat(simd, 1.0 / square(joints.radius_m));
     let mut at = Poses::load(simd, joints, starts);
     let targets = load_lengths(simd, joints, lengths);
     let (step, certificate) = first_step(simd, joints, legs, &at, &targets);
@@ -153,7 +153,7 @@ fn first_step<S: Simd>(
     targets: &[f64x8<S>; LEGS],
 ) -> ([Lanes3<f64x8<S>>; 2], Certificate<S>) {
     let [zero, one] = [0.0, 1.0].map(|value| f64x8::splat(simd, value));
-    let linear_weight = f64x8::splat(simd, 1.0 / square(joints.radius));
+    let linear_weight = f64x8::splat(simd, 1.0 / square(joints.radius_m));
     let mut columns = [Column::zero(simd); LEGS];
     let mut residuals = *targets;
     let (mut curvature, mut wrench) = (zero, zero);
@@ -169,7 +169,7 @@ fn first_step<S: Simd>(
         wrench += column.moment.dot(column.moment).fused_mul_add(linear_weight, one);
     }
     let factorization = PoseFactorization::new(simd, columns.each_ref());
-    let inverse = factorization.inverse_norm_squared(f64x8::splat(simd, square(joints.radius)));
+    let inverse = factorization.inverse_norm_squared(f64x8::splat(simd, square(joints.radius_m)));
     let step = factorization.twist(residuals);
     let certificate = Certificate {
         curvature: (curvature * inverse).sqrt(),
@@ -196,7 +196,7 @@ impl<S: Simd> Certificate<S> {
             *holds = first * square(curvature) <= square(CLEAR_SHARE * MAX_KANTOROVICH_H)
                 && condition <= CLEAR_SHARE * MAX_CONDITION / MAX_CONDITION_GROWTH
                 && first > square(shortest / CLEAR_SHARE)
-                && are_regular_blocks(d_a, d_s, joints.radius_cubed);
+                && are_regular_blocks(d_a, d_s, joints.radius_cubed_m3);
         }
         holds
     }
@@ -211,7 +211,7 @@ impl<S: Simd> Poses<S> {
             vectors(simd, poses, |pose| pose.rotation.column(2).into()),
         ]);
         let position = vectors(simd, poses, |pose| pose.position);
-        Self { rotation, center: position + rotation.times_vector(simd, &joints.center) }
+        Self { rotation, center: position + rotation.times_vector(simd, &joints.center_m) }
     }
 
     /// Arm of a leg from the mean of the joints, and the vector along the leg.
@@ -245,7 +245,7 @@ impl<S: Simd> Poses<S> {
             (y * (three_halves - y.dot(y) * half)).minus_scaled(yz, z).minus_scaled(xy, x),
             (z * (three_halves - z.dot(z) * half)).minus_scaled(zx, x).minus_scaled(yz, y),
         ]);
-        let position = self.center - rotation.times_vector(simd, &joints.center);
+        let position = self.center - rotation.times_vector(simd, &joints.center_m);
         let Matrix([x, y, z]) = rotation;
         let mut poses = [Pose { rotation: Matrix3::identity(), position: Vector3::zeros() }; LANES];
         store(x, &mut poses, |pose, v| pose.rotation.set_column(0, &v));

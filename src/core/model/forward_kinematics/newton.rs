@@ -45,7 +45,7 @@ impl<S: Simd> Iterate<S> {
     #[inline(always)]
     fn start(simd: S, joints: &Joints, pose: &Pose) -> Self {
         let arm = Lanes3::load(simd, &joints.around_center).transformed(simd, &pose.rotation);
-        let center = pose.position + pose.rotation * joints.center;
+        let center = pose.position + pose.rotation * joints.center_m;
         let r = &pose.rotation;
         let rotation = Lanes3 {
             x: f64x4::load_array(simd, [r.m11, r.m12, r.m13, r.m11]),
@@ -86,7 +86,7 @@ impl<S: Simd> Iterate<S> {
         let first = self.reach + Lanes3::load(simd, &joints.base);
         let (first, _) = first.split();
         let center = first.first();
-        Pose { rotation, position: center - rotation * joints.center }
+        Pose { rotation, position: center - rotation * joints.center_m }
     }
 }
 
@@ -106,9 +106,9 @@ impl<'a, S: Simd> Newton<'a, S> {
         let Self { simd, joints, target, inverse_target } = *self;
         let rounding = rounding(joints, &kinematic_state.pose, kinematic_state.sensitivity.condition);
         let last = square(rounding.max(CONVERGED_STEP)); // All sizes are squares.
-        let linear_weight = f64x4::splat(simd, 1.0 / square(joints.radius));
+        let linear_weight = f64x4::splat(simd, 1.0 / square(joints.radius_m));
         let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
-        let mut residual = target - legs.length;
+        let mut residual = target - legs.length_m;
         let mut report = NewtonReport { outcome: Outcome::NotConverged, iterations: 0, step_ratio: f64::NAN };
         // Each step must be shorter than the previous one; by Kantorovich's theorem it is at most half as
         // long.
@@ -180,8 +180,8 @@ impl<'a, S: Simd> Newton<'a, S> {
         factorization: &Factorization<'a, S>,
     ) -> Outcome {
         let Self { simd, joints, target, inverse_target } = *self;
-        legs.length = target;
-        legs.inverse_length = (residual * inverse_target).fused_mul_add(inverse_target, inverse_target);
+        legs.length_m = target;
+        legs.inverse_length_per_m = (residual * inverse_target).fused_mul_add(inverse_target, inverse_target);
         let sensitivity = Sensitivity::new(simd, joints, &legs, factorization);
         // Only growth of K along the step could lead across a singular pose.
         let same_side = sensitivity.determinant * kinematic_state.sensitivity.determinant > 0.0;
@@ -199,7 +199,7 @@ impl<'a, S: Simd> Newton<'a, S> {
 /// Size of a step caused by rounding in differences of coordinates.
 #[inline(always)]
 pub(super) fn rounding(joints: &Joints, start: &Pose, condition: f64) -> f64 {
-    let size = start.position.norm() / joints.radius;
+    let size = start.position.norm() / joints.radius_m;
     f64::EPSILON * ROUNDING_ERRORS_PER_RESIDUAL * (1.0 + size) * condition
 }
 

@@ -11,7 +11,7 @@ fn poses(count: usize, mut check: impl FnMut(&Machine, &Pose, &mut dyn FnMut() -
         let mut random = Random::new(count as u64);
         let mut vector = || Vector3::from_fn(|_, _| random.signed()).cap_magnitude(1.0);
         for _ in 0..count {
-            let way = Twist { angular: vector() * 0.5, linear: vector() * (0.3 * machine.joints.radius) };
+            let way = Twist { angular: vector() * 0.5, linear: vector() * (0.3 * machine.joints.radius_m) };
             check(&machine, &machine.home_pose().displaced(&way), &mut vector);
         }
     }

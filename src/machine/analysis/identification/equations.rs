@@ -42,9 +42,9 @@ pub enum Load {
     /// A point mass \[kg\] at a place in platform axes \[m\].
     Known {
         /// \[kg\]
-        mass: f64,
+        mass_kg: f64,
         /// \[m\]
-        at: [f64; 3],
+        at_m: [f64; 3],
     },
     /// A body that is to be identified.
     Payload,
@@ -53,7 +53,7 @@ pub enum Load {
 impl Load {
     /// Parameters of the body, in the order of the platform's parameters in the regressor.
     pub(super) fn parameters(&self) -> SVector<f64, BODY> {
-        let Self::Known { mass, at: [x, y, z] } = *self else { return SVector::zeros() };
+        let Self::Known { mass_kg: mass, at_m: [x, y, z] } = *self else { return SVector::zeros() };
         SVector::from([1.0, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
             * mass
     }
@@ -76,7 +76,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
     let legs: Vec<_> = samples.iter().map(|sample| leg_motion(machine, &sample.motion)).collect();
     let mut standing = [0.0; LEGS];
     for legs in &legs {
-        standing.iter_mut().zip(legs.rate).for_each(|(sum, rate)| *sum += rate * rate / samples.len() as f64);
+        standing.iter_mut().zip(legs.rate_m_s).for_each(|(sum, rate)| *sum += rate * rate / samples.len() as f64);
     }
     let standing = standing.map(|square| STANDING_M_S.min(STANDING_RATIO * square.sqrt()));
     let known = load.parameters();
@@ -94,12 +94,12 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
         let time_s = samples.first().map_or(0.0, |sample| sample.time_s);
         for ((leg, row), standing) in y.row_iter().enumerate().zip(standing) {
             let of_leg = |values: &[f64; LEGS]| values.get(leg).copied().unwrap_or_default();
-            let rates = || legs.iter().map(|motion| of_leg(&motion.rate));
+            let rates = || legs.iter().map(|motion| of_leg(&motion.rate_m_s));
             let sign = rates().next().unwrap_or_default().signum();
             if rates().any(|rate| !(rate * sign > standing)) {
                 continue;
             }
-            let commands = || samples.iter().map(|sample| of_leg(&sample.command));
+            let commands = || samples.iter().map(|sample| of_leg(&sample.command_n));
             let mean = |sum: f64| sum / GROUP as f64;
             let body = row.fixed_columns::<BODY>(0);
             let mut coefficients = Unknowns::zeros();

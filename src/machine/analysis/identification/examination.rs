@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector, Vector6};
 use serde::Serialize;
 
 use super::equations::{BODY, Equation, GROUP, PAYLOAD, SCALE, UNKNOWNS};
-use super::fit::{DIFFERENCE, Fit, GAUGE, autocorrelation, residual};
+use super::fit::{DIFFERENCE_RATIO, Fit, GAUGE_DEVIATION_RATIO, autocorrelation, residual};
 use super::hypotheses::{Cause, Column, Hypotheses, delay_column, stops};
 use super::parameters::{FREE, Free, LOG_SCALE, Parameters};
 use super::{Load, Run};
@@ -103,10 +103,10 @@ impl Rows {
         let unknowns = parameters.unknowns(&fit.free);
         let mut slopes = DMatrix::zeros(UNKNOWNS, FREE);
         for (index, mut column) in slopes.column_iter_mut().enumerate() {
-            let size = DIFFERENCE * parameters.deviation.row(index).x;
+            let size = DIFFERENCE_RATIO * parameters.deviation.row(index).x;
             let step = Free::from_fn(|row, _| if row == index { size } else { 0.0 });
             let [more, less] = [fit.free + step, fit.free - step].map(|free| parameters.unknowns(&free));
-            column.copy_from(&((more - less) / (2.0 * DIFFERENCE)));
+            column.copy_from(&((more - less) / (2.0 * DIFFERENCE_RATIO)));
         }
         let hypotheses = Hypotheses::new(machine);
         let (mut j, mut h, mut r, mut blocks, mut causes) = (vec![], vec![], vec![], vec![], vec![]);
@@ -133,18 +133,18 @@ impl Rows {
                 }
                 let (_, columns, delay) = group.as_ref()?;
                 let scale = unknowns.row(SCALE + leg).x;
-                let value = residual(equation, &unknowns) / fit.sigma;
-                let slope = slopes.tr_mul(&equation.coefficients) / (scale * fit.sigma)
+                let value = residual(equation, &unknowns) / fit.sigma_n;
+                let slope = slopes.tr_mul(&equation.coefficients) / (scale * fit.sigma_n)
                     - slopes.row(SCALE + leg).transpose() * (value / scale);
                 j.extend(
                     slope
                         .iter()
                         .copied()
-                        .chain([delay.row(leg).x * DELAY_RATIO * delay_deviation_s / fit.sigma]),
+                        .chain([delay.row(leg).x * DELAY_RATIO * delay_deviation_s / fit.sigma_n]),
                 );
-                h.extend(columns.iter().map(|(_, forces)| forces.row(leg).x / (scale * fit.sigma)));
+                h.extend(columns.iter().map(|(_, forces)| forces.row(leg).x / (scale * fit.sigma_n)));
                 r.push(value);
-                commands += (equation.coefficients.row(SCALE + leg).x / fit.sigma).powi(2);
+                commands += (equation.coefficients.row(SCALE + leg).x / fit.sigma_n).powi(2);
                 blocks.push(first_block + (since_s / BLOCK_S) as usize);
                 if causes.is_empty() {
                     causes = columns.iter().map(|(cause, _)| *cause).collect();
@@ -169,7 +169,7 @@ pub(super) fn examine(
     let legs = LOG_SCALE..LOG_SCALE + LEGS;
     let gauge = DVector::from_fn(ALL, |row, _| {
         let deviation = parameters.deviation.get(row).copied().unwrap_or_default();
-        if legs.contains(&row) && !is_scale_known { deviation / (LEGS as f64 * GAUGE) } else { 0.0 }
+        if legs.contains(&row) && !is_scale_known { deviation / (LEGS as f64 * GAUGE_DEVIATION_RATIO) } else { 0.0 }
     });
     let normal = (j.tr_mul(j) + DMatrix::identity(ALL, ALL) + &gauge * gauge.transpose()).cholesky()?;
     let prior = (parameters.prior - fit.free).component_div(&parameters.deviation).push(0.0);
@@ -190,7 +190,7 @@ pub(super) fn examine(
     let mut findings: Vec<_> = rows
         .tested()
         .into_iter()
-        .filter_map(|cause| rows.finding(cause, (&a, &score), fit.inflation))
+        .filter_map(|cause| rows.finding(cause, (&a, &score), fit.inflation_ratio))
         .collect();
     findings.sort_by(|(x, _), (y, _)| y.rank.total_cmp(&x.rank));
     findings.iter().take(WIDENING).for_each(|(_, change)| widen(change));

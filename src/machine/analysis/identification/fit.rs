@@ -25,9 +25,9 @@ const MAX_DAMPING: f64 = 1e12;
 /// Residual before the first fit, over the largest force.
 const FIRST_RESIDUAL_RATIO: f64 = 0.01;
 /// Step of the differences, over the deviation of a parameter.
-pub(super) const DIFFERENCE: f64 = 1e-4;
+pub(super) const DIFFERENCE_RATIO: f64 = 1e-4;
 /// Deviation of the mean logarithm of the force scales, where no known weight shows it.
-pub(super) const GAUGE: f64 = 1e-5;
+pub(super) const GAUGE_DEVIATION_RATIO: f64 = 1e-5;
 /// What is squared and added up: equations of all legs, prior, gauge.
 const DATA_TERMS: usize = LEGS * (UNKNOWNS + 1);
 const TERMS: usize = DATA_TERMS + FREE + 1;
@@ -39,15 +39,15 @@ const MAX_LAG: usize = 50;
 pub(super) struct Fit {
     pub free: Free,
     /// RMS residual \[N\], and how many equations say as much as one that is independent of the others.
-    pub sigma: f64,
-    pub inflation: f64,
+    pub sigma_n: f64,
+    pub inflation_ratio: f64,
     /// Covariance of the free parameters.
     pub covariance: DMatrix<f64>,
     /// Number of directions that the equations show better than the prior, and of those that the prior leaves free.
     pub shown: usize,
     pub unknown: usize,
     /// RMS residual of each leg \[N\], and the autocorrelation of successive residuals.
-    pub residual: [f64; LEGS],
+    pub residual_n: [f64; LEGS],
     pub correlation: [f64; LEGS],
 }
 
@@ -80,12 +80,12 @@ pub(super) fn fit(
     let (covariance, shown, unknown) = problem.covariance(&free, sigma * inflation.sqrt())?;
     Some(Fit {
         free,
-        sigma,
-        inflation,
+        sigma_n: sigma,
+        inflation_ratio: inflation,
         covariance,
         shown,
         unknown,
-        residual: of_legs.each_ref().map(|leg| square(leg).sqrt()),
+        residual_n: of_legs.each_ref().map(|leg| square(leg).sqrt()),
         correlation: of_legs.each_ref().map(|leg| autocorrelation(leg, 1)),
     })
 }
@@ -126,7 +126,7 @@ impl Problem<'_> {
         let departure = free - parameters.prior;
         let prior = departure.component_div(&parameters.deviation);
         let scales = departure.fixed_rows::<LEGS>(LOG_SCALE).sum() / LEGS as f64;
-        let gauge = if *is_scale_known { 0.0 } else { scales / GAUGE };
+        let gauge = if *is_scale_known { 0.0 } else { scales / GAUGE_DEVIATION_RATIO };
         DVector::from_iterator(TERMS, data.chain(prior.iter().copied()).chain([gauge]))
     }
 
@@ -135,9 +135,9 @@ impl Problem<'_> {
         let mut jacobian = DMatrix::zeros(TERMS, FREE);
         for (index, mut column) in jacobian.column_iter_mut().enumerate() {
             let deviation = self.parameters.deviation.row(index).x;
-            let step = Free::from_fn(|row, _| if row == index { DIFFERENCE * deviation } else { 0.0 });
+            let step = Free::from_fn(|row, _| if row == index { DIFFERENCE_RATIO * deviation } else { 0.0 });
             let difference = self.terms(&(free + step), sigma) - self.terms(&(free - step), sigma);
-            column.copy_from(&(difference / (2.0 * DIFFERENCE)));
+            column.copy_from(&(difference / (2.0 * DIFFERENCE_RATIO)));
         }
         jacobian
     }

@@ -83,7 +83,7 @@ pub(super) fn stops(machine: &Machine, samples: &[MotionSample]) -> Vec<[[f64; 2
 
 /// Slopes of the platform against what a body on it feels as gravity, along its x and y.
 fn slopes(machine: &Machine, motion: &Motion) -> [f64; 2] {
-    let proper = motion.pose.rotation.transpose() * (motion.acceleration.linear - machine.gravity);
+    let proper = motion.pose.rotation.transpose() * (motion.acceleration.linear - machine.gravity_m_s2);
     [proper.x, proper.y].map(|along| along / proper.z.abs())
 }
 
@@ -116,9 +116,9 @@ impl Instant {
             motion: sample.motion,
             per_length,
             directions: leg_directions(machine, &sample.motion.pose),
-            length: legs.length.into(),
-            rate: legs.rate.into(),
-            command: sample.command.into(),
+            length: legs.length_m.into(),
+            rate: legs.rate_m_s.into(),
+            command: sample.command_n.into(),
         })
     }
 }
@@ -148,13 +148,13 @@ fn displaced(instants: &[Instant; 3], step_s: f64, errors: &dyn Fn(&Instant) -> 
 impl<'a> Hypotheses<'a> {
     pub fn new(machine: &'a Machine) -> Self {
         let tilted = [Vector3::x(), Vector3::y()].map(|axis| Machine {
-            gravity: Rotation3::new(axis * GRAVITY_RAD) * machine.gravity,
+            gravity_m_s2: Rotation3::new(axis * GRAVITY_RAD) * machine.gravity_m_s2,
             ..machine.clone()
         });
         let old = &machine.joints;
         let [base, platform, axes] =
             [&old.base, &old.platform, &old.universal_axis].map(|lanes| old.triples.unpack_vectors(lanes));
-        let step = LENGTH_RATIO * old.radius;
+        let step = LENGTH_RATIO * old.radius_m;
         let places = (0..LEGS)
             .flat_map(|leg| (0..3).flat_map(move |axis| [true, false].map(|is_base| (leg, axis, is_base))));
         let joint = |(leg, axis, is_base): (usize, usize, bool)| {
@@ -191,7 +191,7 @@ impl<'a> Hypotheses<'a> {
         let forces = y * parameters;
         let change =
             |machine: &Machine, motion: &Motion| Some(regressor(machine, motion)? * parameters - forces);
-        let length = LENGTH_RATIO * machine.joints.radius;
+        let length = LENGTH_RATIO * machine.joints.radius_m;
         let by_length = |errors: &dyn Fn(&Instant) -> Vector6<f64>| {
             change(machine, &displaced(&instants, step_s, errors))
         };
@@ -227,8 +227,8 @@ impl<'a> Hypotheses<'a> {
         let legs = base.iter().zip(&now.directions).zip(&forces);
         let moment: Vector3<f64> =
             legs.map(|((place, direction), force)| place.cross(direction) * *force).sum();
-        let moment = moment / (machine.actuator.max_force * machine.joints.radius);
-        let pressed = now.command / machine.actuator.max_force;
+        let moment = moment / (machine.actuator.max_force_n * machine.joints.radius_m);
+        let pressed = now.command / machine.actuator.max_force_n;
         columns.extend([(Cause::Elasticity, x * moment.x), (Cause::Elasticity, y_tilt * moment.y)]);
         columns.push((Cause::Elasticity, by_length(&|_| pressed * length)?));
         columns.extend(loose_columns(machine, &now.motion, &y, (time, stops)));
@@ -244,7 +244,7 @@ fn loose_columns(
     y: &Regressor,
     (time, stops): (f64, &[[f64; 2]; 2]),
 ) -> impl Iterator<Item = Column> {
-    let moment = LENGTH_RATIO * machine.joints.radius * machine.platform.mass;
+    let moment = LENGTH_RATIO * machine.joints.radius_m * machine.platform.mass_kg;
     let [[x_stop, y_stop], [x_far, y_far]] = *stops;
     let [x_slope, y_slope] = slopes(machine, motion).map(|slope| 10.0 * slope);
     let places = [[x_stop, x_far, x_slope, time], [y_stop, y_far, y_slope, time]];
@@ -262,14 +262,14 @@ fn leg_columns(
     step_s: f64,
     time: f64,
 ) -> Vec<Column> {
-    let [shortest, longest] = [machine.actuator.min_length, machine.actuator.max_length];
+    let [shortest, longest] = [machine.actuator.min_length_m, machine.actuator.max_length_m];
     let delayed = (after.command - before.command) * (DELAY_S / (2.0 * step_s));
     let of_leg = |leg: usize| {
         let unit = unit(leg);
-        let force = unit * (FORCE_RATIO * machine.actuator.max_force);
+        let force = unit * (FORCE_RATIO * machine.actuator.max_force_n);
         let place = (2.0 * now.length.dot(&unit) - shortest - longest) / (longest - shortest);
         let (rate, sign) = (now.rate.dot(&unit), now.rate.dot(&unit).signum());
-        let speed = rate.abs() / machine.actuator.max_rate;
+        let speed = rate.abs() / machine.actuator.max_rate_m_s;
         let own = [place, place * place, place * sign, speed, speed * speed * sign, time];
         let near_standstill = sign * (-rate.abs() / STRIBECK_M_S).exp();
         let others = [
@@ -286,6 +286,6 @@ fn leg_columns(
 pub(super) fn delay_column(group: &[MotionSample]) -> Option<Vector6<f64>> {
     let middle = group.len() / 2;
     let (before, after) = (group.get(middle - REACH)?, group.get(middle + REACH)?);
-    let change = Vector6::from(before.command) - Vector6::from(after.command);
+    let change = Vector6::from(before.command_n) - Vector6::from(after.command_n);
     Some(change / (after.time_s - before.time_s))
 }

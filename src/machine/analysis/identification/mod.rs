@@ -62,7 +62,7 @@ pub struct Identification {
     /// See above.
     pub unknown: usize,
     /// RMS of what is left of the force of each leg \[N\].
-    pub residual: [f64; LEGS],
+    pub residual_n: [f64; LEGS],
     /// Correlation of successive residuals of each leg: 0 for white noise.
     pub correlation: [f64; LEGS],
     /// Base parameters by least squares of the equations alone, without prior: pairs of an index and a value. Indices count
@@ -98,16 +98,16 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
     let all: Vec<Equation> = runs.iter().flat_map(|run| equations(file, &run.samples, &run.load)).collect();
     let has_known_weight = runs.iter().any(|run| matches!(run.load, Load::Known { .. }));
     let is_scale_known = holds_machine || has_known_weight;
-    let fit = fit(&parameters, &all, file.actuator.max_force, is_scale_known)?;
+    let fit = fit(&parameters, &all, file.actuator.max_force_n, is_scale_known)?;
     let Bodies { machine, payload } = parameters.bodies(&fit.free);
-    let Fit { shown, unknown, residual, correlation, .. } = fit;
+    let Fit { shown, unknown, residual_n: residual, correlation, .. } = fit;
     Some(Identification {
         machine,
         payload,
         equations: all.len(),
         shown,
         unknown,
-        residual,
+        residual_n: residual,
         correlation,
         base_parameters: least_squares(file, &all).filter(|_| has_known_weight),
         is_scale_known,
@@ -190,9 +190,9 @@ pub struct Prediction {
     /// Length \[m\] and rate \[m/s\] of the leg in the middle of the group.
     pub motion: [f64; 2],
     /// Recorded command \[N\].
-    pub command: f64,
+    pub command_n: f64,
     /// Recorded command less the machine's \[N\].
-    pub residual: f64,
+    pub residual_n: f64,
 }
 
 /// Predictions of the commands of a run. A leg that nearly stands has none.
@@ -205,8 +205,8 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
         let middle =
             run.samples.get(equation.first + GROUP / 2).map(|sample| leg_motion(machine, &sample.motion));
         let of_leg = |values: [f64; LEGS]| values.get(equation.leg).copied().unwrap_or_default();
-        let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length), of_leg(legs.rate)]);
-        Prediction { leg: equation.leg, time_s: equation.time_s, motion, command, residual }
+        let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length_m), of_leg(legs.rate_m_s)]);
+        Prediction { leg: equation.leg, time_s: equation.time_s, motion, command_n: command, residual_n: residual }
     };
     equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
 }
@@ -220,7 +220,7 @@ const SAME_S: f64 = 5e-3;
 /// motion, and of what differs from one to the next, which no model can explain. `None` if no run has two periods.
 pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LEGS]> {
     let actuator = &machine.actuator;
-    let largest = [actuator.max_length - actuator.min_length, actuator.max_rate];
+    let largest = [actuator.max_length_m - actuator.min_length_m, actuator.max_rate_m_s];
     let mut sums = [[0.0; 3]; LEGS];
     for run in runs {
         let predictions = predictions(machine, run);
@@ -236,8 +236,8 @@ pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LE
                     && pairs.into_iter().all(|((a, b), most)| (a - b).abs() < SAME_RATIO * most);
                 if is_same {
                     *count += 1.0;
-                    *same += one.residual * other.residual;
-                    *different += 0.5 * (one.residual - other.residual).powi(2);
+                    *same += one.residual_n * other.residual_n;
+                    *different += 0.5 * (one.residual_n - other.residual_n).powi(2);
                 }
             }
         }
@@ -252,7 +252,7 @@ pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LE
 /// stands.
 pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
     let mut errors = [(0.0, f64::NAN, 0_u32); LEGS];
-    for Prediction { leg, residual, .. } in runs.iter().flat_map(|run| predictions(machine, run)) {
+    for Prediction { leg, residual_n: residual, .. } in runs.iter().flat_map(|run| predictions(machine, run)) {
         if let Some((squares, largest, count)) = errors.get_mut(leg) {
             (*squares, *largest, *count) =
                 (*squares + residual * residual, largest.max(residual.abs()), *count + 1);

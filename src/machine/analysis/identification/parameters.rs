@@ -85,19 +85,19 @@ pub(super) struct Parameters {
 impl Parameters {
     /// Parameters about a machine.
     pub fn new(file: &Machine) -> Self {
-        let (actuator, radius, mass) = (&file.actuator, file.joints.radius, file.platform.mass);
+        let (actuator, radius, mass) = (&file.actuator, file.joints.radius_m, file.platform.mass_kg);
         let guess = {
             let size = (PAYLOAD_SIZE * radius).powi(2);
             let mass = PAYLOAD_PER_PLATFORM * mass;
-            Platform { mass, center_of_mass: Vector3::zeros(), inertia: Matrix3::identity() * (mass * size) }
+            Platform { mass_kg: mass, center_of_mass_m: Vector3::zeros(), inertia: Matrix3::identity() * (mass * size) }
         };
         let mut prior = Free::zeros();
         prior.fixed_rows_mut::<BODY>(0).copy_from(&cholesky_parameters(&file.platform));
-        prior.fixed_rows_mut::<1>(REFLECTED).fill(actuator.reflected_mass);
+        prior.fixed_rows_mut::<1>(REFLECTED).fill(actuator.reflected_mass_kg);
         for (first, values) in [
-            (VISCOUS, actuator.viscous_friction),
-            (COULOMB, actuator.coulomb_friction),
-            (LOAD, actuator.load_friction),
+            (VISCOUS, actuator.viscous_friction_n_s_m),
+            (COULOMB, actuator.coulomb_friction_n),
+            (LOAD, actuator.load_friction_share),
             (LOG_SCALE, actuator.force_scale.map(f64::ln)),
         ] {
             prior.fixed_rows_mut::<LEGS>(first).copy_from(&Vector6::from(values));
@@ -115,11 +115,11 @@ impl Parameters {
             deviation.fixed_rows_mut::<6>(first + 1).fill(size);
             deviation.fixed_rows_mut::<3>(first + 7).fill(place);
         }
-        let reflected = REFLECTED_RATIO * actuator.reflected_mass + REFLECTED_PER_PLATFORM * mass;
-        let dry = FRICTION_RATIO * actuator.max_force;
+        let reflected = REFLECTED_RATIO * actuator.reflected_mass_kg + REFLECTED_PER_PLATFORM * mass;
+        let dry = FRICTION_RATIO * actuator.max_force_n;
         for (first, count, value) in [
             (REFLECTED, 1, reflected),
-            (VISCOUS, LEGS, dry / actuator.max_rate),
+            (VISCOUS, LEGS, dry / actuator.max_rate_m_s),
             (COULOMB, LEGS, dry),
             (LOAD, LEGS, LOAD_FRICTION),
             (LOG_SCALE, LEGS, FORCE_SCALE_RATIO),
@@ -151,16 +151,16 @@ impl Parameters {
         let body = |first: usize| body(free.fixed_rows::<BODY>(first).into_owned());
         machine.platform = body(0);
         let actuator = &self.file.actuator;
-        let [min, max] = [actuator.min_length, actuator.max_length];
+        let [min, max] = [actuator.min_length_m, actuator.max_length_m];
         let logs = free.fixed_rows::<3>(CYLINDER);
         machine.cylinder = scaled(&self.file.cylinder, 0.0, &logs.into_owned(), [min, max]);
         let (mass, logs) = (free.row(ROD).x, free.fixed_rows::<3>(ROD + 1));
         machine.rod = scaled(&self.file.rod, mass, &logs.into_owned(), [min, max]);
         let legs = |first: usize| free.fixed_rows::<LEGS>(first).into_owned().into();
         let actuator = &mut machine.actuator;
-        actuator.reflected_mass = free.row(REFLECTED).x;
-        (actuator.viscous_friction, actuator.coulomb_friction) = (legs(VISCOUS), legs(COULOMB));
-        actuator.load_friction = legs(LOAD);
+        actuator.reflected_mass_kg = free.row(REFLECTED).x;
+        (actuator.viscous_friction_n_s_m, actuator.coulomb_friction_n) = (legs(VISCOUS), legs(COULOMB));
+        actuator.load_friction_share = legs(LOAD);
         actuator.force_scale = legs(LOG_SCALE).map(f64::exp);
         Bodies { machine, payload: body(LOG_PAYLOAD) }
     }
@@ -169,7 +169,7 @@ impl Parameters {
     pub fn unknowns(&self, free: &Free) -> Unknowns {
         let Bodies { machine, payload } = self.bodies(free);
         let actuator = &machine.actuator;
-        let loss = actuator.force_scale.iter().zip(&actuator.load_friction).map(|(scale, load)| scale * load);
+        let loss = actuator.force_scale.iter().zip(&actuator.load_friction_share).map(|(scale, load)| scale * load);
         let mut unknowns = Unknowns::zeros();
         unknowns.fixed_rows_mut::<PARAMETER_COUNT>(0).copy_from(&inertial_parameters(&machine));
         unknowns.fixed_rows_mut::<LEGS>(SCALE).copy_from(&Vector6::from(actuator.force_scale));
@@ -187,17 +187,17 @@ const HELD: f64 = 1e-6;
 fn scaled(link: &Link, mass: f64, logs: &Vector3<f64>, ends: [f64; 2]) -> Link {
     let mut scaled = link.clone();
     let [center, across, along]: [f64; 3] = (*logs).into();
-    scaled.mass *= mass.exp();
-    scaled.center_of_mass *= center.exp();
-    scaled.axial_inertia *= along.exp();
+    scaled.mass_kg *= mass.exp();
+    scaled.center_of_mass_m *= center.exp();
+    scaled.axial_inertia_kg_m2 *= along.exp();
     // Across, a link has at least half of its axial inertia at every length.
     let inertia = &link.transverse_inertia;
     let least =
-        ends.map(|length| inertia.constant + inertia.quadratic * (length - inertia.reference_length).powi(2));
+        ends.map(|length| inertia.constant_kg_m2 + inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2));
     let excess =
-        least.into_iter().chain([inertia.constant]).fold(f64::INFINITY, f64::min) - 0.5 * link.axial_inertia;
-    scaled.transverse_inertia.constant +=
-        excess * (across.exp() - 1.0) + 0.5 * (scaled.axial_inertia - link.axial_inertia);
+        least.into_iter().chain([inertia.constant_kg_m2]).fold(f64::INFINITY, f64::min) - 0.5 * link.axial_inertia_kg_m2;
+    scaled.transverse_inertia.constant_kg_m2 +=
+        excess * (across.exp() - 1.0) + 0.5 * (scaled.axial_inertia_kg_m2 - link.axial_inertia_kg_m2);
     scaled
 }
 
@@ -209,19 +209,19 @@ fn body(parameters: SVector<f64, BODY>) -> Platform {
     // About the centre of mass the columns of t drop out.
     let moments = triangle * triangle.transpose() * mass;
     let inertia = Matrix3::identity() * moments.trace() - moments;
-    Platform { mass, center_of_mass: Vector3::new(t1, t2, t3), inertia }
+    Platform { mass_kg: mass, center_of_mass_m: Vector3::new(t1, t2, t3), inertia }
 }
 
 /// Cholesky parameters of a body.
 pub(super) fn cholesky_parameters(body: &Platform) -> SVector<f64, BODY> {
-    let moments = (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia) / body.mass;
+    let moments = (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia) / body.mass_kg;
     let moments = moments + Matrix3::identity() * (LEAST_MOMENT * moments.trace());
     // An upper triangle: the lower one of the reversed axes.
     let reversed = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
     let lower =
         (reversed * moments * reversed).cholesky().map_or(Matrix3::identity(), |cholesky| cholesky.l());
     let u = reversed * lower * reversed;
-    let [x, y, z]: [f64; 3] = body.center_of_mass.into();
-    let a = 0.5 * body.mass.ln();
+    let [x, y, z]: [f64; 3] = body.center_of_mass_m.into();
+    let a = 0.5 * body.mass_kg.ln();
     SVector::from([a, u.m11, u.m22, u.m33, u.m12, u.m23, u.m13, x, y, z])
 }

@@ -36,7 +36,7 @@ pub struct MotionSample {
     /// Measured motion of the platform.
     pub motion: Motion,
     /// Commands of the drives \[N\].
-    pub command: [f64; LEGS],
+    pub command_n: [f64; LEGS],
 }
 
 /// Samples of consecutive cycles, evenly spaced. `delay_s` is the time from the release of a cycle to the instant at which
@@ -54,7 +54,7 @@ pub fn samples(stretch: &RecordedStretch, delay_s: f64) -> Vec<MotionSample> {
         .filter_map(|pair| {
             let [now, next] = pair else { return None };
             let [begin, end] = [now, next].map(|sent| seconds(sent.release_ns) + delay_s);
-            Some((0.5 * (begin + end), Vector6::from(now.force)))
+            Some((0.5 * (begin + end), Vector6::from(now.force_n)))
         })
         .collect();
     let poses: Vec<_> = measured.iter().map(|measured| (seconds(measured.time_ns), measured.pose)).collect();
@@ -73,7 +73,7 @@ pub fn samples(stretch: &RecordedStretch, delay_s: f64) -> Vec<MotionSample> {
                 twist: Twist::from_vector(&rate),
                 acceleration: Acceleration::from_vector(&accel),
             },
-            command: command.into(),
+            command_n: command.into(),
         })
     };
     let count = ((duration_s - 2.0 * half_s) / step_s).max(0.0) as u32;

@@ -5,8 +5,8 @@ fn at_10_hz(estimator_hz: f64, told_ms: f64) -> SampledLoop {
     SampledLoop {
         wn_t: core::f64::consts::TAU * 10.0 * 1e-3,
         estimator_ratio: estimator_hz / 10.0,
-        known_delay: 0.6 + told_ms,
-        delay: 0.6 + told_ms,
+        known_delay_periods: 0.6 + told_ms,
+        delay_periods: 0.6 + told_ms,
         ..SampledLoop::default()
     }
 }
@@ -23,7 +23,7 @@ fn margins_are_those_of_an_independent_computation() {
     ] {
         let each = at_10_hz(estimator_hz, told_ms);
         let masses = [1.0 / each.gain_margin(), 1.0 / each.least_gain()];
-        let delay = each.longest_delay() - each.delay;
+        let delay = each.longest_delay() - each.delay_periods;
         println!("{estimator_hz} Hz, {told_ms} ms: {masses:.3?}, {delay:.3}");
         assert!((masses[0] - lightest).abs() < 0.006 && (masses[1] - heaviest).abs() < 0.06, "{masses:?}");
         assert!((delay - further).abs() < 0.06, "{delay}");
@@ -48,7 +48,7 @@ fn a_loop_beyond_its_margins_grows_and_within_them_fades() {
         let with = at_10_hz(30.0, 2.0);
         let gain = share * with.gain_margin();
         let light = SampledLoop { mass_ratio: 1.0 / gain, ..with };
-        let late = SampledLoop { delay: with.delay + share * (with.longest_delay() - with.delay), ..with };
+        let late = SampledLoop { delay_periods: with.delay_periods + share * (with.longest_delay() - with.delay_periods), ..with };
         [(light, share < 1.0), (late, share < 1.0)]
     }) {
         let response = each.response(0.0, 1e-3, 4000);
@@ -65,8 +65,8 @@ fn what_is_stable_is_one_interval_of_bandwidths_and_of_delays() {
         for delay in [0.6, 2.1, 5.3] {
             let each = SampledLoop {
                 compensates_disturbance,
-                known_delay: delay - 0.5,
-                delay,
+                known_delay_periods: delay - 0.5,
+                delay_periods: delay,
                 ..at_10_hz(10.0, 0.0)
             };
             let limit = each.largest_wn_t();
@@ -77,8 +77,8 @@ fn what_is_stable_is_one_interval_of_bandwidths_and_of_delays() {
             }
             let longest = each.longest_delay();
             for tenth in (0..600).filter(|tenth| (0.1 * f64::from(*tenth) - longest).abs() > 0.05) {
-                let at = SampledLoop { delay: delay.max(0.1 * f64::from(tenth)), ..each };
-                assert_eq!(at.is_stable(), at.delay < longest, "{at:?}, {longest}");
+                let at = SampledLoop { delay_periods: delay.max(0.1 * f64::from(tenth)), ..each };
+                assert_eq!(at.is_stable(), at.delay_periods < longest, "{at:?}, {longest}");
             }
         }
     }

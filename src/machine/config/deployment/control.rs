@@ -24,7 +24,7 @@ const DEFAULT_BANDWIDTH_HZ: f64 = 10.0;
 const DAMPING_RATIO_BOUND: Bound = Bound::Within(0.1, 10.0);
 /// Masses of the platform, as ratios of the modelled mass, for which the default bandwidths and the estimator are
 /// stable; a narrower range causes a warning. A payload that is not configured should stay well within them.
-pub const STABLE_MASSES: [f64; 2] = [0.7, 1.5];
+pub const STABLE_MASS_RATIOS: [f64; 2] = [0.7, 1.5];
 /// Largest bandwidth of the estimator over the lesser bandwidth of the loops: with the delay of the drives configured, and
 /// without. A faster estimator only amplifies noise, and an unknown delay would make it unstable.
 const ESTIMATOR_RATIO: f64 = 3.0;
@@ -87,7 +87,7 @@ pub struct Control {
     /// Time for which a platform without setpoints holds its pose before it parks or stops.
     pub lost_hold_s: f64,
     /// Largest error [`FidelityChoice::Auto`] may make, as a share of the peak force of the envelope.
-    pub fidelity_tolerance: f64,
+    pub fidelity_tolerance_share: f64,
     /// Effective masses of the legs at home, and the loop gains of their modes.
     pub leg_masses: LegMasses,
 }
@@ -129,8 +129,8 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     let loops = if mode.acts_on_legs() {
         [softest, stiffest].map(|gain| (position_bandwidth_hz, of(position_damping_ratio), gain))
     } else {
-        let held_pole = limits.held_pole * plant.realtime.period_s();
-        let with = |damping_ratio| SampledLoop { held_pole, ..of(damping_ratio) };
+        let held_pole = limits.held_pole_per_s * plant.realtime.period_s();
+        let with = |damping_ratio| SampledLoop { held_pole_t: held_pole, ..of(damping_ratio) };
         [
             (position_bandwidth_hz, with(position_damping_ratio), 1.0),
             (orientation_bandwidth_hz, with(orientation_damping_ratio), 1.0),
@@ -161,7 +161,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
             Bound::Positive,
         ),
         fidelity: fidelity(&mut section),
-        fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
+        fidelity_tolerance_share: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
         compensate_disturbances,
         disturbance_m_s2_per_sqrt_s,
         estimator_bandwidth_hz: plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops),
@@ -187,7 +187,7 @@ fn velocity_errors_by_friction(
 ) -> Pair<f64> {
     let input_matrix = InputMatrix::at_home(machine, ControlMode::ComputedTorque, masses, Fidelity::Exact);
     let by_force = input_matrix.acceleration_by_force(machine, &machine.home_pose());
-    let reversal = 2.0 * machine.actuator.friction_uncertainty;
+    let reversal = 2.0 * machine.actuator.friction_uncertainty_n;
     let of = |first: usize, hertz: f64| {
         let columns = by_force.column_iter().map(|column| column.fixed_rows::<3>(first).norm());
         VELOCITY_ERROR_BY_FRICTION * reversal * columns.sum::<f64>() / (TAU * hertz)
@@ -247,7 +247,7 @@ pub(in crate::config) fn optimum_hz(disturbance: f64, noise_m: f64, period_s: f6
 }
 
 fn is_stable_with_masses(sampled: &SampledLoop) -> bool {
-    STABLE_MASSES.iter().all(|mass| sampled.is_stable_with_gain(1.0 / mass))
+    STABLE_MASS_RATIOS.iter().all(|mass| sampled.is_stable_with_gain(1.0 / mass))
 }
 
 /// Reads bandwidth and damping ratio of a loop, and rejects a bandwidth that is unstable with the longest delay.
@@ -270,7 +270,7 @@ fn gains(
         largest_hz(|hertz| is_stable_with_masses(&with(hertz)), rate_hz)
     };
     let bandwidth_hz = section.number_or(bandwidth_key, default_hz, Bound::Positive);
-    let is_known = sampled.delay.is_finite() && damping_ratio.is_finite() && bandwidth_hz.is_finite();
+    let is_known = sampled.delay_periods.is_finite() && damping_ratio.is_finite() && bandwidth_hz.is_finite();
     if is_known && !with(bandwidth_hz).is_stable() {
         let modes = if stiffest == 1.0 {
             String::new()
@@ -281,7 +281,7 @@ fn gains(
             "must be at most {} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
              (stable with {:.2} periods from measurement to force{modes})",
             largest_hz(|hertz| with(hertz).is_stable(), rate_hz),
-            sampled.delay,
+            sampled.delay_periods,
         );
         section.reject(bandwidth_key, bound);
         return [f64::NAN, damping_ratio];

@@ -57,7 +57,7 @@ pub struct DeploymentLimits {
     /// Largest Frobenius condition of the legs' wrenches under control.
     pub condition: f64,
     /// Largest pole of the platform under constant forces within that condition \[1/s\].
-    pub held_pole: f64,
+    pub held_pole_per_s: f64,
 }
 
 impl DeploymentLimits {
@@ -82,14 +82,14 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     let scale = section.number_or("scale", 1.0, SCALE_BOUND);
     let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s =
-        section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
+        section.number_or("force_rate_n_s", machine.actuator.max_force_n / FORCE_RISE_S, Bound::Positive);
     let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
     let payload_change_kg = allowed(&mut section, "payload_change_kg");
     let disturbance_step_m_s2 = allowed(&mut section, "disturbance_step_m_s2");
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
     let turning = turning_condition(machine, realtime, &position, feedback_scale);
     let (condition, survey) = condition(&mut section, machine, realtime, turning);
-    let held_pole = survey.iter().map(|pose| pose.pole).fold(0.0, f64::max);
+    let held_pole = survey.iter().map(|pose| pose.pole_per_s).fold(0.0, f64::max);
     let reference = ReferenceLimits { position, orientation, autonomous_scale };
     check_turning(&section, machine, realtime, &survey, &reference, feedback_scale);
     DeploymentLimits {
@@ -101,7 +101,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
         stroke_margin_m,
         force_rate_n_s,
         condition,
-        held_pole,
+        held_pole_per_s: held_pole,
     }
 }
 
@@ -142,7 +142,7 @@ fn turning_condition(
     let middle_s = MIDDLE_OF_HOLD * realtime.period_s();
     let lengths = leg_lengths(machine, &machine.home_pose());
     let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
-    let load = machine.gravity.norm() + (1.0 + feedback_scale) * position.acceleration;
+    let load = machine.gravity_m_s2.norm() + (1.0 + feedback_scale) * position.acceleration;
     feedback_scale * position.acceleration / (position.velocity * middle_s) * shortest / load
 }
 
@@ -160,7 +160,7 @@ fn condition(
     let given = section.has("condition").then(|| section.number_or("condition", usual, Bound::Positive));
     let mut survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
     let delay_s = (realtime.longest_delay_of_any_release() + MIDDLE_OF_HOLD) * realtime.period_s();
-    let is_fast = |pose: &&SurveyedPose| pose.pole * delay_s > MAX_GROWTH_EXPONENT;
+    let is_fast = |pose: &&SurveyedPose| pose.pole_per_s * delay_s > MAX_GROWTH_EXPONENT;
     let first_fast = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
     let slow = survey.iter().map(|pose| pose.condition).filter(|condition| *condition < first_fast);
     let held = if first_fast < usual { slow.fold(0.0, f64::max) } else { usual };

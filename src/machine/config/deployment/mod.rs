@@ -4,7 +4,7 @@
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. Given values are checked against the limits that follow from the rate.
 
-pub use self::control::{Control, FidelityChoice, STABLE_MASSES};
+pub use self::control::{Control, FidelityChoice, STABLE_MASS_RATIOS};
 use self::default_limits::rounded_down;
 pub use self::hardware::{Drive, SensorNoise};
 pub use self::limits::DeploymentLimits;

@@ -69,7 +69,7 @@ pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) 
         },
     };
     let needed_us =
-        1e6 * PlantTerms::choose(machine, &plant.imperfections, plant.step_s, plant.tolerance_m).step;
+        1e6 * PlantTerms::choose(machine, &plant.imperfections, plant.step_s, plant.tolerance_m).step_s;
     if needed_us < MIN_STEP_US {
         section.reject_as(
             "step_us",
@@ -84,17 +84,17 @@ fn drive(mut section: SectionReader) -> DriveErrors {
     let dead_time_us = section.number_or("dead_time_us", 0.0, Bound::Within(0.0, MAX_DEAD_TIME_US));
     DriveErrors {
         bandwidth_hz: section.bounded_number("bandwidth_hz", Bound::Positive),
-        force_step: section.number_or("force_step_n", 0.0, Bound::NotNegative),
+        force_step_n: section.number_or("force_step_n", 0.0, Bound::NotNegative),
         dead_time_ns: (1e3 * dead_time_us).round() as u64,
     }
 }
 
 fn friction(mut section: SectionReader) -> Friction {
     Friction {
-        viscous: section.number_or("viscous_n_s_m", 0.0, Bound::NotNegative),
-        coulomb: section.number_or("coulomb_n", 0.0, Bound::NotNegative),
-        stiction: section.number_or("stiction_n", 0.0, Bound::NotNegative),
-        stribeck_speed: section.number_or(
+        viscous_n_s_m: section.number_or("viscous_n_s_m", 0.0, Bound::NotNegative),
+        coulomb_n: section.number_or("coulomb_n", 0.0, Bound::NotNegative),
+        stiction_n: section.number_or("stiction_n", 0.0, Bound::NotNegative),
+        stribeck_speed_m_s: section.number_or(
             "stribeck_speed_m_s",
             Friction::STRIBECK_SPEED_M_S,
             Bound::Positive,
@@ -106,7 +106,7 @@ fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     let stiffness = section.bounded_number("stiffness_n_m", Bound::Positive);
     let damping = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
     let backlash = section.number_or("backlash_m", 0.0, Bound::NotNegative);
-    if stiffness.is_some() && machine.actuator.reflected_mass == 0.0 {
+    if stiffness.is_some() && machine.actuator.reflected_mass_kg == 0.0 {
         section.reject(
             "stiffness_n_m",
             "must not be given with actuator.reflected_mass_kg = 0: a drive behind a spring has mass",
@@ -115,24 +115,24 @@ fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     if stiffness.is_none() && backlash > 0.0 {
         section.reject("backlash_m", "must be 0 without stiffness_n_m: the flanks of a backlash are springs");
     }
-    stiffness.map(|stiffness| ElasticLeg { stiffness, damping, backlash })
+    stiffness.map(|stiffness| ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: damping, backlash_m: backlash })
 }
 
 fn sensor(mut section: SectionReader) -> SensorErrors {
     let mut number = |key| section.number_or(key, 0.0, Bound::NotNegative);
     SensorErrors {
-        length_step: number("length_step_m"),
-        rate_step: number("rate_step_m_s"),
-        length_noise: number("length_noise_m"),
-        rate_noise: number("rate_noise_m_s"),
+        length_step_m: number("length_step_m"),
+        rate_step_m_s: number("rate_step_m_s"),
+        length_noise_m: number("length_noise_m"),
+        rate_noise_m_s: number("rate_noise_m_s"),
     }
 }
 
 fn build(mut section: SectionReader) -> BuildErrors {
     BuildErrors {
-        payload: section.number_or("payload_kg", 0.0, Bound::NotNegative),
-        payload_at: Vector3::from(section.vector_or("payload_position_m", [0.0; 3])),
-        joints: section.number_or("joint_error_m", 0.0, Bound::NotNegative),
+        payload_kg: section.number_or("payload_kg", 0.0, Bound::NotNegative),
+        payload_at_m: Vector3::from(section.vector_or("payload_position_m", [0.0; 3])),
+        joint_deviation_m: section.number_or("joint_error_m", 0.0, Bound::NotNegative),
     }
 }
 

@@ -138,8 +138,8 @@ impl Realtime {
         SampledLoop {
             wn_t: TAU * bandwidth_hz * self.period_s(),
             damping_ratio,
-            known_delay: self.known_delay() + drive,
-            delay: self.longest_delay() + drive,
+            known_delay_periods: self.known_delay() + drive,
+            delay_periods: self.longest_delay() + drive,
             ..SampledLoop::default()
         }
     }

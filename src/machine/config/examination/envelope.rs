@@ -72,13 +72,13 @@ fn examine_motion(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     let (mut largest_force, mut largest_rate) = (0.0_f64, 0.0_f64);
     for motion in (0..CORNER_COUNT).map(|k| envelope.at(&envelope.corner(k)).motion()) {
         let largest = |values: [f64; LEGS]| values.into_iter().map(f64::abs).fold(0.0, f64::max);
-        largest_rate = largest_rate.max(largest(leg_motion(machine, &motion).rate));
+        largest_rate = largest_rate.max(largest(leg_motion(machine, &motion).rate_m_s));
         largest_force = largest_force.max(inverse_dynamics::<Exact>(machine, &motion).map_or(0.0, largest));
     }
     let actuator = &machine.actuator;
     for (key, largest, limit, unit, limited) in [
         ("envelope.acceleration", largest_force, actuator.available_force(), "N", "actuator.max_force_n"),
-        ("envelope.velocity", largest_rate, actuator.max_rate, "m/s", "actuator.max_rate_m_s"),
+        ("envelope.velocity", largest_rate, actuator.max_rate_m_s, "m/s", "actuator.max_rate_m_s"),
     ] {
         if largest > limit {
             let value = format!("up to {} {unit} in a leg", rounded(largest));

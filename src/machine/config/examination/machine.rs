@@ -31,7 +31,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
 /// Rejects drives that cannot hold the platform with a margin. The leg counts from 0.
 pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, place: &str) {
     let actuator = &examiner.config.machine.actuator;
-    let (limit, available) = (actuator.max_force, actuator.available_force());
+    let (limit, available) = (actuator.max_force_n, actuator.available_force());
     if force > MAX_HOLDING_SHARE * available {
         let bound = format!(
             "must be at least {} to hold the platform: leg {} needs {} N {place}, {:.0} % of the limit, and at most {:.0} % may be needed",
@@ -118,9 +118,9 @@ fn examine_crossing(examiner: &mut Examiner, crossing: &LegCrossing) {
 fn examine_gravity(examiner: &mut Examiner) {
     let machine = &examiner.config.machine;
     let up = platform_from_base(machine);
-    let cosine = machine.gravity.dot(&up) / (machine.gravity.norm() * up.norm());
+    let cosine = machine.gravity_m_s2.dot(&up) / (machine.gravity_m_s2.norm() * up.norm());
     if cosine > MAX_STANDING_COSINE {
-        let value = format!("{:?}", <[f64; 3]>::from(machine.gravity));
+        let value = format!("{:?}", <[f64; 3]>::from(machine.gravity_m_s2));
         let bound = if cosine > -MAX_STANDING_COSINE {
             "points from the base to the platform at home: the platform hangs; else check its sign, or home"
         } else {

@@ -26,7 +26,7 @@ fn ratio(key: &'static str, ratio: f64, of: &'static str, usual: RangeInclusive<
 }
 
 pub(super) fn examine(examiner: &mut Examiner) {
-    let gravity = examiner.config.machine.gravity.norm();
+    let gravity = examiner.config.machine.gravity_m_s2.norm();
     if gravity != 0.0 && !(9.7..=9.9).contains(&gravity) {
         let bound = "on the Earth it is 9.76 to 9.84 m/s^2, in space 0; check its unit, or the site";
         examiner.warn("gravity_m_s2", format!("{} long", rounded(gravity)), bound);
@@ -47,17 +47,17 @@ pub(super) fn examine(examiner: &mut Examiner) {
 fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let machine = &examiner.config.machine;
     let (platform, cylinder, rod) = (&machine.platform, &machine.cylinder, &machine.rod);
-    let (radius, shortest) = (machine.joints.radius, machine.actuator.min_length);
-    let gyration = (0.5 * platform.inertia.trace() / platform.mass).sqrt();
+    let (radius, shortest) = (machine.joints.radius_m, machine.actuator.min_length_m);
+    let gyration = (0.5 * platform.inertia.trace() / platform.mass_kg).sqrt();
     let transverse = |link: &Link| {
         let inertia = &link.transverse_inertia;
-        inertia.constant + inertia.quadratic * (shortest - inertia.reference_length).powi(2)
+        inertia.constant_kg_m2 + inertia.quadratic_kg * (shortest - inertia.reference_length_m).powi(2)
     };
     let of_link = |link: &Link| {
         [
-            link.center_of_mass / shortest,
-            (link.axial_inertia / link.mass).sqrt() / shortest,
-            (transverse(link) / link.mass).sqrt() / shortest,
+            link.center_of_mass_m / shortest,
+            (link.axial_inertia_kg_m2 / link.mass_kg).sqrt() / shortest,
+            (transverse(link) / link.mass_kg).sqrt() / shortest,
         ]
     };
     let [cylinder_center, cylinder_axial, cylinder_transverse] = of_link(cylinder);
@@ -70,13 +70,13 @@ fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
     vec![
         ratio(
             "platform.mass_kg",
-            platform.mass / (cylinder.mass + rod.mass),
+            platform.mass_kg / (cylinder.mass_kg + rod.mass_kg),
             "the mass of a leg",
             0.5..=300.0,
         ),
         ratio(
             "platform.center_of_mass_m",
-            platform.center_of_mass.norm() / radius,
+            platform.center_of_mass_m.norm() / radius,
             "the radius of the joints",
             0.0..=3.0,
         ),
@@ -87,7 +87,7 @@ fn body_ratios(examiner: &Examiner) -> Vec<Ratio> {
             0.25..=2.5,
         ),
         ratio("leg", base_radius / radius, "platform_m (radii of the joints by base_m)", 0.3..=8.0),
-        ratio("cylinder.mass_kg", cylinder.mass / rod.mass, "rod.mass_kg", 0.2..=8.0),
+        ratio("cylinder.mass_kg", cylinder.mass_kg / rod.mass_kg, "rod.mass_kg", 0.2..=8.0),
         ratio("cylinder.center_of_mass_m", cylinder_center, LENGTH, 0.1..=1.2),
         ratio("cylinder.axial_inertia_kg_m2", cylinder_axial, GYRATION, 0.01..=0.25),
         ratio("cylinder.transverse_inertia_kg_m2", cylinder_transverse, GYRATION, 0.05..=0.7),
@@ -104,36 +104,36 @@ fn drive_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let largest = |of_legs: &[f64; LEGS]| of_legs.iter().copied().fold(0.0, f64::max);
     let drives = DriveCapability::new(machine, &machine.home_pose());
     let held = drives.map_or(0.0, |drives| drives.hardest_held().1);
-    let (force, stroke) = (actuator.max_force, actuator.max_length - actuator.min_length);
+    let (force, stroke) = (actuator.max_force_n, actuator.max_length_m - actuator.min_length_m);
     const FORCE: &str = "actuator.max_force_n";
     vec![
         ratio(
             "actuator.max_length_m",
-            actuator.max_length / actuator.min_length,
+            actuator.max_length_m / actuator.min_length_m,
             "actuator.min_length_m",
             1.0..=6.0,
         ),
         ratio(
             "actuator.max_rate_m_s",
-            stroke / actuator.max_rate,
+            stroke / actuator.max_rate_m_s,
             "a second for the whole stroke",
             0.005..=150.0,
         ),
         ratio(FORCE, force / held, "the largest force that holds the platform at home", 1.0..=120.0),
         ratio(
             "actuator.reflected_mass_kg",
-            actuator.reflected_mass * LEGS as f64 / machine.platform.mass,
+            actuator.reflected_mass_kg * LEGS as f64 / machine.platform.mass_kg,
             "the platform's mass on a leg",
             0.1..=150.0,
         ),
         ratio(
             "actuator.viscous_friction_n_s_m",
-            largest(&actuator.viscous_friction) * actuator.max_rate / force,
+            largest(&actuator.viscous_friction_n_s_m) * actuator.max_rate_m_s / force,
             "actuator.max_force_n at max_rate_m_s",
             0.003..=0.6,
         ),
-        ratio("actuator.coulomb_friction_n", largest(&actuator.coulomb_friction) / force, FORCE, 0.001..=0.4),
-        ratio("actuator.friction_uncertainty_n", actuator.friction_uncertainty / force, FORCE, 0.001..=0.4),
+        ratio("actuator.coulomb_friction_n", largest(&actuator.coulomb_friction_n) / force, FORCE, 0.001..=0.4),
+        ratio("actuator.friction_uncertainty_n", actuator.friction_uncertainty_n / force, FORCE, 0.001..=0.4),
     ]
 }
 
@@ -142,8 +142,8 @@ fn limit_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let machine = &examiner.config.machine;
     let (limits, control) = (&examiner.config.deployment.limits, &examiner.config.deployment.control);
     let (linear, actuator) = (&limits.reference.position, &machine.actuator);
-    let stroke = actuator.max_length - actuator.min_length;
-    let payload = limits.payload_change_kg.unwrap_or_default() / machine.platform.mass;
+    let stroke = actuator.max_length_m - actuator.min_length_m;
+    let payload = limits.payload_change_kg.unwrap_or_default() / machine.platform.mass_kg;
     let [step, change] =
         [limits.disturbance_step_m_s2.unwrap_or_default(), control.disturbance_m_s2_per_sqrt_s]
             .map(|disturbance| disturbance / linear.acceleration);
@@ -160,7 +160,7 @@ fn limit_ratios(examiner: &Examiner) -> Vec<Ratio> {
         ratio("control.disturbance_m_s2_per_sqrt_s", change, ACCELERATION, 0.03..=10.0),
         ratio(
             "limits.force_rate_n_s",
-            limits.force_rate_n_s / actuator.max_force,
+            limits.force_rate_n_s / actuator.max_force_n,
             "actuator.max_force_n in a second",
             3.0..=900.0,
         ),
@@ -171,9 +171,9 @@ fn limit_ratios(examiner: &Examiner) -> Vec<Ratio> {
 /// Noise and steps of the sensors.
 fn sensor_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let (actuator, noise) = (&examiner.config.machine.actuator, &examiner.config.deployment.noise);
-    let stroke = actuator.max_length - actuator.min_length;
+    let stroke = actuator.max_length_m - actuator.min_length_m;
     let per_step = if noise.length_step_m > 0.0 { noise.length_m / noise.length_step_m } else { 0.0 };
-    let rate = noise.rate_m_s.unwrap_or_default() / actuator.max_rate;
+    let rate = noise.rate_m_s.unwrap_or_default() / actuator.max_rate_m_s;
     let tolerance = noise.pose_tolerance_m / noise.length_m;
     const NOISE: &str = "measured.length_noise_m";
     vec![
@@ -191,7 +191,7 @@ fn pair_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let deployment = &examiner.config.deployment;
     let (control, limits) = (&deployment.control, &deployment.limits.reference);
     let (linear, angular, window) = (&limits.position, &limits.orientation, &deployment.in_position);
-    let at_radius = |linear: f64, angular: f64| linear / angular / examiner.config.machine.joints.radius;
+    let at_radius = |linear: f64, angular: f64| linear / angular / examiner.config.machine.joints.radius_m;
     let velocity = at_radius(linear.velocity, angular.velocity);
     let acceleration = at_radius(linear.acceleration, angular.acceleration);
     let tolerance = at_radius(window.tolerance_m, window.tolerance_rad);

@@ -70,7 +70,7 @@ impl KalmanFilter {
         time_ns: u64,
         measured: &ErrorCoordinates,
     ) -> Vector6<f64> {
-        let EstimatorConstants { noise, max_compensated, .. } = constants;
+        let EstimatorConstants { noise, max_compensated_acceleration: max_compensated, .. } = constants;
         let Self { state, covariance, .. } = self;
         let rate_hz = 1.0 / noise.period_s;
         covariance.advance(noise, seconds_between(self.time_ns, time_ns) * rate_hz);
@@ -102,20 +102,20 @@ pub struct EstimatorConstants {
     pub covariance: Covariance,
     /// Bound on the estimated disturbance of each axis: the largest that is compensated. Without compensation
     /// there is no bound; a bound would make the estimated error wrong by the excess.
-    pub max_compensated: Vector6<f64>,
+    pub max_compensated_acceleration: Vector6<f64>,
     /// Noise and resolution of a length reading \[m\].
     pub reading_errors: ReadingErrors,
     /// Largest plausible acceleration of the platform that the model does not contain \[m/s^2\].
-    pub largest_disturbance: f64,
+    pub max_plausible_acceleration_m_s2: f64,
 }
 
 /// Errors of the length readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadingErrors {
     /// Standard deviation of the noise \[m\].
-    pub deviation: f64,
+    pub deviation_m: f64,
     /// Resolution \[m\]; 0 if unknown.
-    pub resolution: f64,
+    pub resolution_m: f64,
 }
 
 /// Largest innovation by noise, in standard deviations; noise exceeds it once in years.
@@ -131,15 +131,15 @@ impl EstimatorConstants {
         max_compensated: Vector6<f64>,
         largest_disturbance: f64,
     ) -> Self {
-        Self { noise, covariance: noise.steady().0, max_compensated, reading_errors, largest_disturbance }
+        Self { noise, covariance: noise.steady().0, max_compensated_acceleration: max_compensated, reading_errors, max_plausible_acceleration_m_s2: largest_disturbance }
     }
 
     /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, plus the
     /// displacement by a disturbance that the estimate does not yet contain, `a (1 / we^2 + dt^2 / 2)`.
     pub fn innovation_bound(&self, dt: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth_rad_s;
-        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation)
-            + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
+        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation_m)
+            + self.max_plausible_acceleration_m_s2 * (lag * lag + 0.5 * dt * dt)
     }
 }
 

@@ -10,9 +10,9 @@ use crate::model::task::TaskState;
 
 const ZERO: Matrix6<f64> = Matrix6::from_array_storage(nalgebra::ArrayStorage([[0.0; 6]; 6]));
 const NO_FRICTION: FrictionEffects = FrictionEffects {
-    force: 0.0,
-    payload: [0.0; 6],
-    acceleration: [0.0; 6],
+    force_n: 0.0,
+    payload_kg_per_n: [0.0; 6],
+    acceleration_m_s2_per_n: [0.0; 6],
     by_force: ZERO,
     force_by_disturbance: ZERO,
 };
@@ -22,7 +22,7 @@ const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     payload_by_norm: 0.2,
     gravity_over_square: Vector3::new(0.0, 0.0, -1.0 / 9.81),
     max_payload_change_kg: 0.1,
-    max_sudden_disturbance: 2.0,
+    max_sudden_acceleration_m_s2: 2.0,
     swing: MIN_SWING_PEAK_TO_PEAK_M,
     swing_by_acceleration: 1.0 / SWING_STIFFNESS,
     swing_by_friction: 1.0 / SWING_STIFFNESS,

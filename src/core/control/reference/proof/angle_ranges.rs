@@ -82,7 +82,7 @@ impl AngleRanges {
     pub fn if_stop_may_leave(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<Self> {
         let Envelope { lowest, highest } = envelope;
         let [_, beta, ..] = x;
-        let turn = stop.peak_velocity * stop.duration;
+        let turn = stop.peak_velocity * stop.duration_s;
         let need = turn / libm::cos((beta.abs() + turn).min(FRAC_PI_2));
         let mut ranges = x.iter().zip(lowest.iter().zip(highest)).take(3);
         let have_room = ranges.all(|(x, (low, high))| (x - low).min(high - x) >= need);

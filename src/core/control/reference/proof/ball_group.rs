@@ -44,7 +44,7 @@ impl BallGroup {
         self.rotation.iter_mut().zip(center.rotation.as_slice()).for_each(|(column, r)| put(column, *r));
         put(&mut self.norm, ball.norm);
         put(&mut self.inverse_norm, ball.inverse_norm);
-        put(&mut self.shortest, ball.shortest);
+        put(&mut self.shortest, ball.shortest_m);
         put(&mut self.universal_sine, ball.regularity.universal_sine);
     }
 
@@ -79,7 +79,7 @@ impl BallGroup {
         let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
         let (shortest, universal_sine) = (load(&self.shortest), load(&self.universal_sine));
         let turn = distances.turn + splat(reach.angular);
-        let moved = distances.shift + splat(reach.linear) + splat(constants.arm) * turn;
+        let moved = distances.shift + splat(reach.linear) + splat(constants.arm_m) * turn;
         let left = shortest - moved;
         let turned_squared = moved * moved / (shortest * left);
         let turned_leg = turned_squared.sqrt();
@@ -116,7 +116,7 @@ impl<S: Simd> Coverage<S> {
             lanes.fold((0, f64::INFINITY), |least, lane| if lane.1 < least.1 { lane } else { least });
         let of_lane = |lanes: f64x4<S>| lanes.to_array().get(lane).copied().unwrap_or(f64::INFINITY);
         let distance =
-            CenterDistance { turn: of_lane(self.turn), turned_leg: of_lane(self.turned_leg), change };
+            CenterDistance { turn_rad: of_lane(self.turn), turned_leg: of_lane(self.turned_leg), change };
         Some((lane, distance))
     }
 }

@@ -24,27 +24,27 @@ use crate::control::constants::Constants;
 use crate::control::signals::limits::Limits;
 
 /// Largest departures of a value and of a rate from the cubic, for a third derivative of 1 over a time of 1.
-pub(in crate::control::reference) const CUBIC_DEPARTURE: f64 = 1.0 / 96.0;
-pub(in crate::control::reference) const CUBIC_RATE_DEPARTURE: f64 = 1.0 / 30.0;
+pub(in crate::control::reference) const CUBIC_DEPARTURE_RATIO: f64 = 1.0 / 96.0;
+pub(in crate::control::reference) const CUBIC_RATE_DEPARTURE_RATIO: f64 = 1.0 / 30.0;
 /// `2 / sqrt 3`: factor in the third derivative of a length, due to the turning of the leg alone.
 const LEG_TURNING_JERK_FACTOR: f64 = 1.154_700_538_379_251_7;
 
 /// Bound on the third derivative of a leg's length, for the peak velocities v and w of a stop.
 pub(in crate::control::reference) fn length_jerk_bound(constants: &Constants, v: f64, w: f64) -> f64 {
     let Limits { orientation, position, .. } = &constants.parameters.limits;
-    let (arm, joint) = (constants.arm, v + constants.arm * w);
+    let (arm, joint) = (constants.arm_m, v + constants.arm_m * w);
     let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
     let joint_jerk =
         position.jerk + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w);
-    let turning = joint / constants.machine().actuator.min_length;
+    let turning = joint / constants.machine().actuator.min_length_m;
     joint_jerk + turning * (3.0 * joint_acceleration + LEG_TURNING_JERK_FACTOR * turning * joint)
 }
 
 /// Bound on the second derivative of a leg's length, for the peak velocities v and w of a stop.
 pub(in crate::control::reference) fn length_acceleration_bound(constants: &Constants, v: f64, w: f64) -> f64 {
     let Limits { orientation, position, .. } = &constants.parameters.limits;
-    let joint = v + constants.arm * w;
+    let joint = v + constants.arm_m * w;
     position.acceleration
-        + constants.arm * (orientation.acceleration + w * w)
-        + joint * joint / constants.machine().actuator.min_length
+        + constants.arm_m * (orientation.acceleration + w * w)
+        + joint * joint / constants.machine().actuator.min_length_m
 }

@@ -38,16 +38,16 @@ const MAX_EVALUATIONS: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(in crate::control::reference) struct ForceBounds {
     /// At rest.
-    pub holding: f64,
+    pub holding_n: f64,
     /// In motion.
-    pub moving: f64,
+    pub moving_n: f64,
 }
 
 impl ForceBounds {
     /// Bounds for a platform within them.
     pub fn new(machine: &Machine) -> Self {
         let force = machine.actuator.available_force();
-        Self { holding: MAX_HOLDING_SHARE * force, moving: MAX_MOVING_SHARE * force }
+        Self { holding_n: MAX_HOLDING_SHARE * force, moving_n: MAX_MOVING_SHARE * force }
     }
 
     /// Relaxes the bounds if the drives hold more at a pose. It may be left by what they can give beyond that.
@@ -57,17 +57,17 @@ impl ForceBounds {
         let actuator = &constants.machine().actuator;
         let (available, friction) = (actuator.available_force(), actuator.largest_coulomb_friction());
         let holding = largest(forces) + friction;
-        let is_beyond = holding > self.holding;
+        let is_beyond = holding > self.holding_n;
         if is_beyond {
             let moving = holding + (MAX_MOVING_SHARE - MAX_HOLDING_SHARE) * available;
-            *self = Self { holding: holding + START_FORCE_RATIO * available, moving: moving.min(available) };
+            *self = Self { holding_n: holding + START_FORCE_RATIO * available, moving_n: moving.min(available) };
         }
         is_beyond
     }
 
     /// The lesser of both bounds.
     pub fn tighter_of(&self, other: &Self) -> Self {
-        Self { holding: self.holding.min(other.holding), moving: self.moving.min(other.moving) }
+        Self { holding_n: self.holding_n.min(other.holding_n), moving_n: self.moving_n.min(other.moving_n) }
     }
 }
 
@@ -82,10 +82,10 @@ impl StopDemand {
     fn largest(&self) -> LargestMotion {
         let Self { accelerations, speeds } = self;
         LargestMotion {
-            angular: accelerations.angular.largest,
-            linear: accelerations.linear.largest,
-            angular_velocity: speeds.angular,
-            velocity: speeds.linear,
+            angular_rad_s2: accelerations.angular.largest,
+            linear_m_s2: accelerations.linear.largest,
+            angular_velocity_rad_s: speeds.angular,
+            velocity_m_s: speeds.linear,
         }
     }
 }
@@ -94,7 +94,7 @@ impl StopDemand {
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control::reference) struct CenterDistance {
     /// t, q and D.
-    pub turn: f64,
+    pub turn_rad: f64,
     pub turned_leg: f64,
     pub change: f64,
 }
@@ -151,7 +151,7 @@ impl BallLoads {
     ) -> f64 {
         largest
             + self.factor(distance) * (change.wrench + distance.change * (norm + axial_norm))
-            + change.axial
+            + change.axial_n
     }
 
     /// Bound on a force at rest at a distance from the centre.
@@ -162,7 +162,7 @@ impl BallLoads {
         changes: &ForceChangeBounds,
         distance: &CenterDistance,
     ) -> f64 {
-        let change = changes.at_rest(distance.turn, distance.turned_leg);
+        let change = changes.at_rest(distance.turn_rad, distance.turned_leg);
         let axial_norm = changes.axial_norm(&LargestMotion::default());
         self.largest_around(center.holding, axial_norm, &change, distance)
     }
@@ -195,7 +195,7 @@ impl ForceProof {
     pub fn new(constants: &Constants, demand: StopDemand, bounds: ForceBounds, kind: StopKind) -> Self {
         let held_between_knots = match kind {
             StopKind::ReleaseFirst => 0.0,
-            StopKind::BrakeAtOnce => FORCE_BETWEEN_KNOTS_RATIO * bounds.moving,
+            StopKind::BrakeAtOnce => FORCE_BETWEEN_KNOTS_RATIO * bounds.moving_n,
         };
         let at_any_pose = constants.force_changes.whole(&demand.largest());
         let evaluations_left = MAX_EVALUATIONS;
@@ -210,8 +210,8 @@ impl ForceProof {
     /// Whether the drives are strong enough whatever the pose, with the factor of a ball.
     #[inline(always)]
     fn is_generous(&self, ball: &BallLoads, distance: &CenterDistance) -> bool {
-        let ForceBound { wrench, axial } = self.at_any_pose;
-        ball.factor(distance) * wrench + axial <= self.bounds.holding
+        let ForceBound { wrench, axial_n: axial } = self.at_any_pose;
+        ball.factor(distance) * wrench + axial <= self.bounds.holding_n
     }
 
     /// Loads at the centre of a ball, computed if the effort suffices.
@@ -246,15 +246,15 @@ impl ForceProof {
             }
         };
         let changes = &constants.force_changes;
-        let CenterDistance { turn, turned_leg, .. } = *distance;
+        let CenterDistance { turn_rad: turn, turned_leg, .. } = *distance;
         let motion = self.demand.largest();
         let (at_rest, moving) =
             (changes.at_rest(turn, turned_leg), changes.moving(&motion, turn, turned_leg));
         let change =
-            ForceBound { wrench: at_rest.wrench + moving.wrench, axial: at_rest.axial + moving.axial };
+            ForceBound { wrench: at_rest.wrench + moving.wrench, axial_n: at_rest.axial_n + moving.axial_n };
         let axial_norm = changes.axial_norm(&motion);
-        ball.largest_around(peaks, axial_norm, &change, distance) <= self.bounds.moving
-            && ball.largest_held(&center, changes, distance) <= self.bounds.holding + self.held_between_knots
+        ball.largest_around(peaks, axial_norm, &change, distance) <= self.bounds.moving_n
+            && ball.largest_held(&center, changes, distance) <= self.bounds.holding_n + self.held_between_knots
     }
 
     /// Whether the drives can hold the platform at a distance from the centre of a ball.
@@ -267,7 +267,7 @@ impl ForceProof {
     ) -> bool {
         self.is_generous(ball, distance)
             || self.center_loads(constants, ball).is_some_and(|center| {
-                ball.largest_held(&center, &constants.force_changes, distance) <= self.bounds.holding
+                ball.largest_held(&center, &constants.force_changes, distance) <= self.bounds.holding_n
             })
     }
 }

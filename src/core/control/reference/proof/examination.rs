@@ -22,7 +22,7 @@ use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::angle_ranges::{AngleRanges, cosine_of_beta};
 use crate::control::reference::proof::cubic_departure::{
-    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, length_acceleration_bound, length_jerk_bound,
+    CUBIC_DEPARTURE_RATIO, CUBIC_RATE_DEPARTURE_RATIO, length_acceleration_bound, length_jerk_bound,
 };
 use crate::control::reference::proof::drive_forces::ForceProof;
 use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTERVALS};
@@ -32,7 +32,7 @@ use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{REGULARITY_EFFORT, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
-use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING, BETWEEN_KNOTS_RATIO, ROUNDING};
+use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_RATIO, ROUNDING};
 use crate::control::reference::stop::pose_stop::{
     PoseStop, PoseStopState, advanced_without_orthonormalizing,
 };
@@ -114,17 +114,17 @@ impl<'a> StopExamination<'a> {
         }
         let curvature = length_acceleration_bound(constants, v, w);
         let actuator = &constants.machine().actuator;
-        let needs_rates = v + constants.arm * w > actuator.max_rate;
+        let needs_rates = v + constants.arm_m * w > actuator.max_rate_m_s;
         let length_jerk_bound = length_jerk_bound(constants, v, w);
         // Enough knots that the departures of lengths are small, and of rates if these matter.
         let duration = stop.duration();
         let (square, cube) = (duration * duration, duration * duration * duration);
-        let length_share = CUBIC_DEPARTURE * length_jerk_bound * cube / LENGTH_DEPARTURE_M;
-        let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate;
+        let length_share = CUBIC_DEPARTURE_RATIO * length_jerk_bound * cube / LENGTH_DEPARTURE_M;
+        let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate_m_s;
         let rate_share =
-            if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk_bound * square / max_departure } else { 0.0 };
+            if needs_rates { CUBIC_RATE_DEPARTURE_RATIO * length_jerk_bound * square / max_departure } else { 0.0 };
         let knots = Knots::new(duration, rate_share, length_share);
-        let chord = step.duration * step.duration / 8.0;
+        let chord = step.duration_s * step.duration_s / 8.0;
         // The jerk is along the velocity u and, across it, along the remaining part of the acceleration's
         // direction e.
         let Motion { twist, acceleration, .. } = motion;
@@ -136,7 +136,7 @@ impl<'a> StopExamination<'a> {
             knots,
             length_jerk_bound,
             step_departure: [curvature, length_jerk_bound, position.acceleration].map(|bound| bound * chord),
-            step_s: step.duration,
+            step_s: step.duration_s,
             directions: u.abs() * 2.0 + e.abs(),
             needs_rates,
             positions: bounds.envelope.as_ref().map(PositionRanges::new),
@@ -150,8 +150,8 @@ impl<'a> StopExamination<'a> {
             start_regularity: None,
             relaxed: None,
             effort: MAX_STEP_EFFORT.saturating_sub(step.effort).saturating_sub(knots.intervals),
-            shortest: constants.machine().joints.triples.pack(&bounds.shortest),
-            longest: constants.machine().joints.triples.pack(&bounds.longest),
+            shortest: constants.machine().joints.triples.pack(&bounds.shortest_m),
+            longest: constants.machine().joints.triples.pack(&bounds.longest_m),
             stop,
             forces,
         })
@@ -216,7 +216,7 @@ impl<'a> StopExamination<'a> {
         let (short, long) = (length + next.min(last), length + next.max(last));
         let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
         let [in_step, ..] = self.step_departure;
-        let departure = (self.length_jerk_bound * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let departure = (self.length_jerk_bound * CUBIC_DEPARTURE_RATIO * dt * dt * dt).max(in_step);
         let margin = (departure - BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
         if !room.simd_ge(splat(margin - self.length_excess)).all_true() {
             return Err(Limit::Stroke.into());
@@ -239,8 +239,8 @@ impl<'a> StopExamination<'a> {
     ) -> bool {
         let dt = adjacent.longest();
         let [_, in_step, _] = self.step_departure;
-        let margin = (self.length_jerk_bound * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
-        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - margin);
+        let margin = (self.length_jerk_bound * CUBIC_RATE_DEPARTURE_RATIO * dt * dt).max(in_step);
+        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate_m_s - margin);
         let between = before.map_or(*rate, |(length_before, rate_before)| {
             (*length - *length_before) * f64x8::splat(simd, 3.0 / adjacent.before_s) - *rate_before - *rate
         });
@@ -297,7 +297,7 @@ impl<'a> StopExamination<'a> {
         let dt = adjacent.longest();
         let [.., in_step] = self.step_departure;
         let jerk = self.constants.parameters.limits.position.jerk;
-        let margin = self.directions * (jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let margin = self.directions * (jerk * CUBIC_DEPARTURE_RATIO * dt * dt * dt).max(in_step);
         let at = |t: f64| pose.position + state.position.velocity * t;
         positions.contain(simd, [&at(adjacent.after_s / 3.0), &at(-adjacent.before_s / 3.0)], &margin)
             && self
@@ -309,7 +309,7 @@ impl<'a> StopExamination<'a> {
     /// Departure of the angles from their chords around a knot, less the allowance between knots \[rad\].
     #[inline(always)]
     fn angle_margin(&self, pose: &Pose, state: &PoseStopState, dt: f64) -> f64 {
-        if !(self.stop.orientation.duration > 0.0) {
+        if !(self.stop.orientation.duration_s > 0.0) {
             return 0.0;
         }
         let dt = dt.max(self.step_s);
@@ -318,7 +318,7 @@ impl<'a> StopExamination<'a> {
         let w = state.orientation.velocity.norm() + alpha * dt;
         let w = self.stop.orientation.peak_velocity.min(w);
         let curvature = alpha / c + w * w * (1.0 + c + 3.0 * s) / (c * c);
-        let room = BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
+        let room = BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm_m;
         (curvature * dt * dt / 8.0 - room).max(0.0)
     }
 
@@ -336,7 +336,7 @@ impl<'a> StopExamination<'a> {
         relaxed != envelope
             && dispatch!(level, simd => {
                 PositionRanges::new(relaxed).contain(simd, [&pose.position; 2], &Vector3::zeros())
-                    && angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING)
+                    && angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING_RAD)
             })
     }
 }

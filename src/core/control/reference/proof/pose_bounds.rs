@@ -17,9 +17,9 @@ use crate::model::task::task_coordinates;
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseBounds {
     /// Least leg lengths \[m\].
-    pub shortest: [f64; LEGS],
+    pub shortest_m: [f64; LEGS],
     /// Largest leg lengths \[m\].
-    pub longest: [f64; LEGS],
+    pub longest_m: [f64; LEGS],
     pub envelope: Option<Envelope>,
     pub forces: ForceBounds,
     is_relaxed: bool,
@@ -30,8 +30,8 @@ impl PoseBounds {
     pub fn configured(constants: &Constants) -> Self {
         let (actuator, parameters) = (&constants.machine().actuator, &constants.parameters);
         Self {
-            shortest: [actuator.min_length + parameters.stroke_margin; LEGS],
-            longest: [actuator.max_length - parameters.stroke_margin; LEGS],
+            shortest_m: [actuator.min_length_m + parameters.stroke_margin_m; LEGS],
+            longest_m: [actuator.max_length_m - parameters.stroke_margin_m; LEGS],
             envelope: parameters.envelope.map(|Envelope { lowest, highest }| Envelope {
                 lowest: lowest.map(|x| x - ROUNDING),
                 highest: highest.map(|x| x + ROUNDING),
@@ -47,16 +47,16 @@ impl PoseBounds {
         let actuator = &constants.machine().actuator;
         let [stroke_room, end_room] = [START_RATIO, END_STOP_RATIO].map(|ratio| ratio * actuator.stroke());
         let lengths = leg_lengths(constants.machine(), pose);
-        let (low_end, high_end) = (actuator.min_length + end_room, actuator.max_length - end_room);
-        for (bound, length) in bounds.shortest.iter_mut().zip(lengths) {
+        let (low_end, high_end) = (actuator.min_length_m + end_room, actuator.max_length_m - end_room);
+        for (bound, length) in bounds.shortest_m.iter_mut().zip(lengths) {
             bounds.is_relaxed |= relax(bound, length, -stroke_room, low_end);
         }
-        for (bound, length) in bounds.longest.iter_mut().zip(lengths) {
+        for (bound, length) in bounds.longest_m.iter_mut().zip(lengths) {
             bounds.is_relaxed |= relax(bound, length, stroke_room, high_end);
         }
         if let Some(Envelope { lowest, highest }) = &mut bounds.envelope {
             let x = task_coordinates(pose, &constants.machine().home);
-            let turn_room = stroke_room / constants.machine().joints.radius;
+            let turn_room = stroke_room / constants.machine().joints.radius_m;
             let rooms = [turn_room, turn_room, turn_room, stroke_room, stroke_room, stroke_room];
             for ((low, high), (x, room)) in lowest.iter_mut().zip(highest).zip(x.iter().zip(rooms)) {
                 bounds.is_relaxed |=
@@ -72,7 +72,7 @@ impl PoseBounds {
     /// Distance by which the worst leg exceeds its bound at a pose; 0 if none does \[m\].
     pub fn length_excess(&self, constants: &Constants, pose: &Pose) -> f64 {
         let lengths = leg_lengths(constants.machine(), pose);
-        let ends = self.shortest.iter().zip(&self.longest);
+        let ends = self.shortest_m.iter().zip(&self.longest_m);
         let excesses =
             lengths.iter().zip(ends).map(|(length, (short, long))| (short - length).max(length - long));
         excesses.fold(0.0, f64::max)
@@ -87,8 +87,8 @@ impl PoseBounds {
         let inner = |bound: &mut [f64; LEGS], other: &[f64; LEGS], pick: fn(f64, f64) -> f64| {
             bound.iter_mut().zip(other).for_each(|(bound, other)| *bound = pick(*bound, *other));
         };
-        inner(&mut self.shortest, &around.shortest, f64::max);
-        inner(&mut self.longest, &around.longest, f64::min);
+        inner(&mut self.shortest_m, &around.shortest_m, f64::max);
+        inner(&mut self.longest_m, &around.longest_m, f64::min);
         if let (Some(own), Some(other)) = (&mut self.envelope, &around.envelope) {
             inner(&mut own.lowest, &other.lowest, f64::max);
             inner(&mut own.highest, &other.highest, f64::min);

@@ -50,15 +50,15 @@ impl Regularity {
 
     /// Bounds that the reference must keep.
     pub fn reference_bounds(constants: &Constants) -> Self {
-        Self { condition: constants.max_reference_condition, universal_sine: constants.universal_sine }
+        Self { condition: constants.max_reference_condition, universal_sine: constants.least_universal_sine }
     }
 
     /// Bounds that poses between knots must keep: the platform's limit of the condition, and a sine that is
     /// smaller in the same ratio.
     pub fn between_knots_bounds(constants: &Constants) -> Self {
-        let condition = constants.parameters.condition;
+        let condition = constants.parameters.max_condition;
         let share = (constants.max_reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
-        Self { condition, universal_sine: constants.universal_sine * share }
+        Self { condition, universal_sine: constants.least_universal_sine * share }
     }
 
     /// The looser of both bounds, for each quantity.
@@ -78,7 +78,7 @@ impl Regularity {
 pub(super) struct Ball {
     pub norm: f64,
     pub inverse_norm: f64,
-    pub shortest: f64,
+    pub shortest_m: f64,
     /// Regularity of the centre.
     pub regularity: Regularity,
     pub loads: BallLoads,
@@ -89,7 +89,7 @@ impl Ball {
     /// pivots are needed: their effort is subtracted afterwards.
     pub fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
-        let Conditioning { sensitivity, largest_row, shortest, universal_sine, is_pivoted } =
+        let Conditioning { sensitivity, largest_row_norm: largest_row, shortest_leg_m: shortest, universal_sine, is_pivoted } =
             Conditioning::new(constants.machine(), center);
         if is_pivoted {
             *effort = effort.saturating_sub(PIVOTING_EFFORT);
@@ -98,7 +98,7 @@ impl Ball {
         let regularity = Regularity { condition, universal_sine };
         let inverse_norm = condition / norm;
         let loads = BallLoads::new(center, inverse_norm, largest_row);
-        Ok(Self { norm, inverse_norm, shortest, regularity, loads })
+        Ok(Self { norm, inverse_norm, shortest_m: shortest, regularity, loads })
     }
 }
 /// Distances around a pose: shift \[m\] and turn \[rad\].

@@ -13,18 +13,18 @@ pub(in crate::control::reference) struct Step<'a> {
     /// Pose at the start of the step; `None` for the first motion.
     pub from: Option<&'a Pose>,
     /// Duration \[s\].
-    pub duration: f64,
+    pub duration_s: f64,
     /// Bounds on the velocities within the step, besides those at its ends, see [`inner_speeds`].
     pub inner_speeds: Pair<f64>,
     /// Effort that is spent already, in knots of an examination.
     pub effort: u32,
     /// Share of the accelerations with which the stop is planned.
-    pub strength: f64,
+    pub strength_share: f64,
 }
 
 impl Default for Step<'_> {
     fn default() -> Self {
-        Self { from: None, duration: 0.0, inner_speeds: Pair::default(), effort: 0, strength: 1.0 }
+        Self { from: None, duration_s: 0.0, inner_speeds: Pair::default(), effort: 0, strength_share: 1.0 }
     }
 }
 

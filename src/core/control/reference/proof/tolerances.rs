@@ -23,6 +23,6 @@ pub(in crate::control::reference) const WALL_RATIO: f64 = 5e-3;
 /// equal.
 pub(in crate::control::reference) const ROUNDING: f64 = 1e-9;
 /// Allowance for the rounding of an angle \[rad\].
-pub(in crate::control::reference) const ANGLE_ROUNDING: f64 = 1e-15;
+pub(in crate::control::reference) const ANGLE_ROUNDING_RAD: f64 = 1e-15;
 
-const _: () = assert!(WALL_RATIO > 100.0 * BETWEEN_KNOTS_RATIO && ANGLE_ROUNDING < ROUNDING);
+const _: () = assert!(WALL_RATIO > 100.0 * BETWEEN_KNOTS_RATIO && ANGLE_ROUNDING_RAD < ROUNDING);

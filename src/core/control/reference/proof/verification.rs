@@ -44,14 +44,14 @@ impl Verifier {
     ) -> Result<StopKind, Refusal> {
         let Limits { orientation, position, .. } = &constants.parameters.limits;
         let Motion { pose, twist, acceleration } = motion;
-        let limits = constants.parameters.limits.with_accelerations_scaled(step.strength);
+        let limits = constants.parameters.limits.with_accelerations_scaled(step.strength_share);
         let turn = release_first_extent(&twist.angular, &acceleration.angular, &limits.orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, &limits.position);
         let (inner, allowed) = (&step.inner_speeds, 1.0 + ROUNDING);
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
         let around = RegularityQuery {
             pose,
-            reach: Pair { angular: turn.length, linear: shift.length },
+            reach: Pair { angular: turn.distance_bound, linear: shift.distance_bound },
             required: Regularity::reference_bounds(constants),
         };
         let forces = |kind, speeds, limits: &Limits| {
@@ -65,9 +65,9 @@ impl Verifier {
             && turn.peak_velocity <= orientation.velocity
             && inner.linear <= allowed * position.velocity
             && inner.angular <= allowed * orientation.velocity
-            && shift.peak_velocity + constants.arm * turn.peak_velocity
-                <= constants.machine().actuator.max_rate
-            && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)
+            && shift.peak_velocity + constants.arm_m * turn.peak_velocity
+                <= constants.machine().actuator.max_rate_m_s
+            && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration_s)
             && self.balls.prove(constants, &around, &mut free, &mut effort);
         if is_free {
             return Ok(StopKind::ReleaseFirst);
@@ -96,9 +96,9 @@ fn has_room(
 ) -> bool {
     let margin =
         length_acceleration_bound(constants, shift.peak_velocity, turn.peak_velocity) * step_s * step_s / 8.0;
-    let need = shift.length + constants.arm * turn.length + margin;
+    let need = shift.distance_bound + constants.arm_m * turn.distance_bound + margin;
     let lengths = leg_lengths(constants.machine(), pose);
-    let legs = lengths.iter().zip(bounds.shortest.iter().zip(&bounds.longest));
+    let legs = lengths.iter().zip(bounds.shortest_m.iter().zip(&bounds.longest_m));
     let is_within_stroke = legs
         .map(|(length, (shortest, longest))| (length - shortest).min(longest - length))
         .fold(f64::INFINITY, f64::min)
@@ -107,9 +107,9 @@ fn has_room(
         return is_within_stroke;
     };
     let [_, beta, ..] = x;
-    let c = libm::cos((beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2));
-    let turned = turn.length / c + margin / constants.arm;
-    let needs = [turned, turned, turned, shift.length + margin, shift.length + margin, shift.length + margin];
+    let c = libm::cos((beta.abs() + turn.distance_bound).min(core::f64::consts::FRAC_PI_2));
+    let turned = turn.distance_bound / c + margin / constants.arm_m;
+    let needs = [turned, turned, turned, shift.distance_bound + margin, shift.distance_bound + margin, shift.distance_bound + margin];
     let Envelope { lowest, highest } = envelope;
     x.iter()
         .zip(needs)

@@ -51,8 +51,8 @@ pub(in crate::control::reference) struct TargetOffset {
     /// `e`.
     pub offset: Vector3<f64>,
     /// `v_t` and `a_t`.
-    pub velocity: Vector3<f64>,
-    pub acceleration: Vector3<f64>,
+    pub target_velocity: Vector3<f64>,
+    pub target_acceleration: Vector3<f64>,
 }
 
 /// Velocity wanted at the next instant, and its derivative.
@@ -105,7 +105,7 @@ impl Approach {
 
     fn wanted_at(
         &self,
-        TargetOffset { offset, velocity, acceleration }: &TargetOffset,
+        TargetOffset { offset, target_velocity: velocity, target_acceleration: acceleration }: &TargetOffset,
         ahead: &Vector3<f64>,
         distance: f64,
         root: f64,
@@ -234,8 +234,8 @@ pub(in crate::control::reference) fn limit_leg_rates(
     shift: &mut WantedVelocity,
 ) -> bool {
     let machine = constants.machine();
-    let limit = LEG_RATE_SHARE * machine.actuator.max_rate;
-    if shift.velocity.norm() + constants.arm * turn.velocity.norm() <= limit {
+    let limit = LEG_RATE_SHARE * machine.actuator.max_rate_m_s;
+    if shift.velocity.norm() + constants.arm_m * turn.velocity.norm() <= limit {
         return false;
     }
     let twist = Twist { angular: turn.velocity, linear: shift.velocity };

@@ -162,17 +162,17 @@ impl Walls {
         step_s: f64,
     ) -> Self {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
-        let radius = machine.joints.radius;
+        let radius = machine.joints.radius_m;
         let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
         let kept = WALL_RATIO * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
-        let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
+        let LegMotion { length_m: length, rate_m_s: rate, accel_m_s2: accel } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
         let approach = Approach::of_bound(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let halves_s = half_durations(limits, led);
         let half_s = halves_s.angular.max(halves_s.linear);
         let per_way = 1.0 / half_s;
-        let ends = bounds.shortest.iter().zip(&bounds.longest);
+        let ends = bounds.shortest_m.iter().zip(&bounds.longest_m);
         let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
         for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.into_iter().zip(legs) {
             let [mx, my, mz, nx, ny, nz] = column;
@@ -359,7 +359,7 @@ fn padded(v: &Vector6<f64>) -> [f64; LANES] {
 /// Half of the durations of the stops of rotation and translation, from a twist with zero acceleration \[s\].
 /// This is the ratio of stopping distance to velocity.
 fn half_durations(limits: &Limits, twist: &Twist) -> Pair<f64> {
-    let half = |velocity: &Vector3<f64>, limits| 0.5 * straight_extent(velocity.norm(), limits).duration;
+    let half = |velocity: &Vector3<f64>, limits| 0.5 * straight_extent(velocity.norm(), limits).duration_s;
     Pair { angular: half(&twist.angular, &limits.orientation), linear: half(&twist.linear, &limits.position) }
 }
 

@@ -88,7 +88,7 @@ impl PoseStop {
 
     /// Time to rest \[s\].
     pub fn duration(&self) -> f64 {
-        self.orientation.duration.max(self.position.duration)
+        self.orientation.duration_s.max(self.position.duration_s)
     }
 
     /// State `t` seconds after the start, in SIMD lanes.

@@ -52,9 +52,9 @@ const MAX_PIECES: usize = 9;
 pub(in crate::control::reference) struct StopExtent {
     pub peak_velocity: f64,
     /// Duration \[s\].
-    pub duration: f64,
+    pub duration_s: f64,
     /// Bound on the distance from the start.
-    pub length: f64,
+    pub distance_bound: f64,
 }
 
 /// Extent of the release-first stop.
@@ -69,8 +69,8 @@ pub(in crate::control::reference) fn release_first_extent(
     let straight = straight_extent(released, limits);
     StopExtent {
         peak_velocity,
-        duration: release + straight.duration,
-        length: peak_velocity * release + straight.length,
+        duration_s: release + straight.duration_s,
+        distance_bound: peak_velocity * release + straight.distance_bound,
     }
 }
 
@@ -86,7 +86,7 @@ pub(in crate::control::reference) fn straight_extent(
         let ramp = (v / jerk).sqrt();
         (2.0 * ramp, v * ramp)
     };
-    StopExtent { peak_velocity: v, duration, length }
+    StopExtent { peak_velocity: v, duration_s: duration, distance_bound: length }
 }
 
 /// Direction u of the stop that brakes at once: along the velocity, or the acceleration if there is none.
@@ -160,7 +160,7 @@ pub(in crate::control::reference) struct Stop {
     /// Bound on the velocity.
     pub peak_velocity: f64,
     /// Duration \[s\].
-    pub duration: f64,
+    pub duration_s: f64,
 }
 
 impl Stop {
@@ -253,7 +253,7 @@ impl<'a, S: Simd> Pieces<'a, S> {
     #[inline(always)]
     fn new(simd: S, stop: &'a mut Stop, v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
         let end = StopState { velocity: *v, acceleration: *a, ..StopState::default() };
-        (stop.count, stop.begins, stop.duration) = (0, [f64::INFINITY; MAX_PIECES], 0.0);
+        (stop.count, stop.begins, stop.duration_s) = (0, [f64::INFINITY; MAX_PIECES], 0.0);
         Self { simd, stop, end }
     }
 
@@ -263,7 +263,7 @@ impl<'a, S: Simd> Pieces<'a, S> {
         if !(dt > 0.0) {
             return;
         }
-        let Self { simd, stop: Stop { pieces, count, begins, duration, .. }, end } = self;
+        let Self { simd, stop: Stop { pieces, count, begins, duration_s: duration, .. }, end } = self;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
             (*piece, *begin) = (Piece::new(end, &jerk), *duration);
             *count += 1;
@@ -292,7 +292,7 @@ impl<'a, S: Simd> Pieces<'a, S> {
     #[inline(always)]
     fn finish_with_rest(self, peak_velocity: f64) {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
-        let Stop { pieces, count, begins, duration, .. } = self.stop;
+        let Stop { pieces, count, begins, duration_s: duration, .. } = self.stop;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
             (*piece, *begin) = (Piece::new(&rest, &Vector3::zeros()), *duration);
             *count += 1;

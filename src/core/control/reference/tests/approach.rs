@@ -59,7 +59,7 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
         let [velocity, ahead, acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
         let at = |dt: f64| {
             let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
-            let target = TargetOffset { offset, velocity: velocity + acceleration * dt, acceleration };
+            let target = TargetOffset { offset, target_velocity: velocity + acceleration * dt, target_acceleration: acceleration };
             // The target of the other vector does not matter.
             let beside = TargetOffset { offset: 3.0 * offset, ..target };
             let both = Pair { angular: &ahead, linear: &ahead };
@@ -169,7 +169,7 @@ fn wanted_velocities_are_reduced_by_one_factor_until_no_leg_moves_too_fast() {
     let mut samples = RandomVectors::new(53);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
-    let limit = 0.97 * machine.actuator.max_rate;
+    let limit = 0.97 * machine.actuator.max_rate_m_s;
     let mut reduced = 0;
     for _ in 0..500 {
         let pose = pose(&mut samples, &constants);

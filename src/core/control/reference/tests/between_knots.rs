@@ -14,7 +14,7 @@ pub(super) fn scene(samples: &mut RandomVectors, acceleration: f64, jerk: f64) -
         limits.jerk *= jerk;
     }
     scene.constants.max_reference_condition = 1e9;
-    scene.constants.parameters.condition = 1e9;
+    scene.constants.parameters.max_condition = 1e9;
     scene.motion = Motion {
         pose: *scene.constants.home.pose(),
         twist: Twist::default(),
@@ -89,7 +89,7 @@ fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
         }
         count += 1;
         let excess = extremes.highest[axis] - bound;
-        let room = ROOM_RATIO * scene.constants.machine().actuator.stroke() / scene.constants.arm;
+        let room = ROOM_RATIO * scene.constants.machine().actuator.stroke() / scene.constants.arm_m;
         assert!(excess <= room, "axis {axis}: {excess} {:?}", scene.motion);
     }
     assert!(count > 50, "{count}");
@@ -108,7 +108,7 @@ fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
         let moved = |axis| {
             let mut moved = scene.motion;
             moved.twist.linear = Vector3::ith(axis, 1.0);
-            leg_motion(machine, &moved).rate[leg]
+            leg_motion(machine, &moved).rate_m_s[leg]
         };
         let direction = Vector3::from_fn(|axis, _| moved(axis));
         let across = direction.cross(&Vector3::z()).normalize();
@@ -163,7 +163,7 @@ fn the_middle_of_a_long_step_keeps_every_bound() {
             let (_, bound) = scene.tightened(Bound::Longest(leg)).unwrap();
             let excess = length - bound;
             assert!(excess <= ROOM_RATIO * machine.actuator.stroke(), "{part} {duration} {leg}: {excess}");
-            scene.bounds.longest[leg] = 100.0;
+            scene.bounds.longest_m[leg] = 100.0;
         }
         // Angles are left out: their bound holds only for steps that are no longer than the time between
         // knots.
@@ -223,7 +223,7 @@ fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted
             twist: Twist { linear: v + (a + jerk * (t / 2.0)) * t, ..*twist },
             ..scene.motion
         };
-        let rates = leg_motion(scene.constants.machine(), &middle).rate;
+        let rates = leg_motion(scene.constants.machine(), &middle).rate_m_s;
         let rate = rates.into_iter().fold(0.0_f64, |largest, rate| largest.max(rate.abs()));
         let (_, bound) = scene.tightened(Bound::Rate).unwrap();
         assert!(rate <= bound && rate > 0.8 * bound, "{h}: {rate} {bound}");
@@ -237,7 +237,7 @@ fn the_condition_at_knots_keeps_the_limit_of_the_reference() {
     let mut count = [0; 2];
     for _ in 0..300 {
         let mut scene = Scene::new(&mut samples);
-        scene.constants.parameters.condition = 1e9;
+        scene.constants.parameters.max_condition = 1e9;
         let before =
             KinematicState::new(scene.constants.machine(), scene.motion.pose).sensitivity().condition;
         let Some((extremes, bound)) = scene.tightened(Bound::ReferenceCondition) else { continue };

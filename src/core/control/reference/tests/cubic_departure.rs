@@ -1,7 +1,7 @@
 //! Tests of the bounds on derivatives of lengths, term by term, and on the departure between two knots.
 
 use crate::control::reference::proof::cubic_departure::{
-    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, length_acceleration_bound, length_jerk_bound,
+    CUBIC_DEPARTURE_RATIO, CUBIC_RATE_DEPARTURE_RATIO, length_acceleration_bound, length_jerk_bound,
 };
 use crate::control::reference::tests::between_knots::scene;
 use crate::control::reference::tests::*;
@@ -27,7 +27,7 @@ fn no_length_is_curved_more_than_its_bound() {
             Acceleration { angular: unit(&mut samples) * alpha, linear: unit(&mut samples) * a };
         let bound = length_acceleration_bound(&scene.constants, sizes[2], sizes[3]);
         let legs = leg_motion(scene.constants.machine(), &scene.motion);
-        let largest = legs.accel.iter().fold(0.0_f64, |largest, accel| largest.max(accel.abs()));
+        let largest = legs.accel_m_s2.iter().fold(0.0_f64, |largest, accel| largest.max(accel.abs()));
         used[term] = used[term].max(largest / bound);
     }
     assert!(used.iter().all(|used| (0.4..=1.0).contains(used)), "{used:?}");
@@ -54,8 +54,8 @@ fn a_function_departs_from_its_cubic_by_no_more_than_its_bound() {
         let cubic = end * t * t * (3.0 - 2.0 * t) + end_rate * t * t * (t - 1.0);
         let cubic_rate = 6.0 * end * t * (1.0 - t) + end_rate * t * (3.0 * t - 2.0);
         let [value, rate] = f(t);
-        largest[0] = largest[0].max((value - cubic).abs() / CUBIC_DEPARTURE);
-        largest[1] = largest[1].max((rate - cubic_rate).abs() / CUBIC_RATE_DEPARTURE);
+        largest[0] = largest[0].max((value - cubic).abs() / CUBIC_DEPARTURE_RATIO);
+        largest[1] = largest[1].max((rate - cubic_rate).abs() / CUBIC_RATE_DEPARTURE_RATIO);
     }
     assert!(largest.iter().all(|largest| (0.94..=1.0).contains(largest)), "{largest:?}");
 }
@@ -106,11 +106,11 @@ fn no_length_has_a_third_derivative_beyond_its_bound() {
                 twist: along(1.0, t, 0.5 * t * t),
                 acceleration: Acceleration { angular: acceleration.angular, linear: acceleration.linear },
             };
-            leg_motion(scene.constants.machine(), &motion).accel
+            leg_motion(scene.constants.machine(), &motion).accel_m_s2
         };
         // The shortest leg decides.
         let mut machine = scene.constants.machine().clone();
-        machine.actuator.min_length = leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
+        machine.actuator.min_length_m = leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
         let constants = Constants::new(&machine, scene.constants.parameters);
         let bound = length_jerk_bound(&constants, v, w);
         let largest =

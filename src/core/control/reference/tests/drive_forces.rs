@@ -11,9 +11,9 @@ fn no_force_changes_by_more_than_its_bound() {
     let mut samples = RandomVectors::new(2026_1126);
     for number in 0..20 {
         let mut machine = machine(&mut samples);
-        machine.platform.center_of_mass = samples.vector(0.3);
-        machine.actuator.reflected_mass = 100.0 * samples.uniform();
-        machine.actuator.viscous_friction = [100.0 * samples.uniform(); LEGS];
+        machine.platform.center_of_mass_m = samples.vector(0.3);
+        machine.actuator.reflected_mass_kg = 100.0 * samples.uniform();
+        machine.actuator.viscous_friction_n_s_m = [100.0 * samples.uniform(); LEGS];
         let (dynamics, changes) = (InverseDynamics::new(&machine), ForceChangeBounds::new(&machine));
         let (stroke, mut nearest) = (machine.actuator.stroke(), 0.0_f64);
         for _ in 0..1000 {
@@ -21,9 +21,9 @@ fn no_force_changes_by_more_than_its_bound() {
             let center = machine.home_pose().displaced(&around);
             let step = Twist { angular: samples.vector(0.1), linear: samples.vector(0.1 * stroke) };
             let (turn, shift) = (step.angular.norm(), step.linear.norm());
-            let Conditioning { sensitivity, largest_row, shortest, universal_sine, .. } =
+            let Conditioning { sensitivity, largest_row_norm: largest_row, shortest_leg_m: shortest, universal_sine, .. } =
                 Conditioning::new(&machine, &center);
-            let moved = shift + changes.arm * turn;
+            let moved = shift + changes.arm_m * turn;
             let turned_leg = moved / (shortest * (shortest - moved)).sqrt();
             let change = (6.0 * (turned_leg.powi(2) + (turn + turned_leg).powi(2))).sqrt();
             let inverse = sensitivity.condition / sensitivity.norm;
@@ -33,10 +33,10 @@ fn no_force_changes_by_more_than_its_bound() {
             let twist = Twist { angular: samples.vector(1.0), linear: samples.vector(1.0) };
             let acceleration = Acceleration { angular: samples.vector(10.0), linear: samples.vector(5.0) };
             let largest = LargestMotion {
-                angular: acceleration.angular.norm(),
-                linear: acceleration.linear.norm(),
-                angular_velocity: twist.angular.norm(),
-                velocity: twist.linear.norm(),
+                angular_rad_s2: acceleration.angular.norm(),
+                linear_m_s2: acceleration.linear.norm(),
+                angular_velocity_rad_s: twist.angular.norm(),
+                velocity_m_s: twist.linear.norm(),
             };
             let forces =
                 |pose, twist| dynamics.forces::<Exact>(&Motion { pose, twist, acceleration }).unwrap();
@@ -47,8 +47,8 @@ fn no_force_changes_by_more_than_its_bound() {
             let wrench = rest.wrench + moving.wrench + change * (norm + changes.axial_norm(&largest));
             // The reference never exceeds the rate of the legs.
             let friction = machine.actuator.largest_viscous_friction()
-                * (largest.velocity + changes.arm * largest.angular_velocity - changes.max_rate).max(0.0);
-            let bound = largest_row / (1.0 - inverse * change) * wrench + rest.axial + moving.axial;
+                * (largest.velocity_m_s + changes.arm_m * largest.angular_velocity_rad_s - changes.max_rate_m_s).max(0.0);
+            let bound = largest_row / (1.0 - inverse * change) * wrench + rest.axial_n + moving.axial_n;
             for (there, here) in forces(center.displaced(&step), twist).iter().zip(at_center) {
                 let ratio = (there - here).abs() / (bound + friction + 1e-9);
                 assert!(ratio <= 1.0, "{number}: {ratio}");

@@ -80,7 +80,7 @@ fn a_long_cycle_moves_as_several_short_ones() {
 /// The largest rate of a leg is 97 % of its limit during a long motion.
 #[test]
 fn the_reference_cruises_at_the_limit_of_leg_rates() {
-    let constants = constants(|machine, _| machine.actuator.max_rate = 0.4);
+    let constants = constants(|machine, _| machine.actuator.max_rate_m_s = 0.4);
     let setpoint = standing(&constants, [0.0, 0.0, 0.0, 0.0, 0.0, 0.6]);
     let mut reference = started(&constants, &at_rest(constants.home.pose()));
     let (mut fastest, mut cruising) = (0.0_f64, 0);

@@ -41,11 +41,11 @@ fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
 fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
     let change = |limit: Limit| {
         move |machine: &mut Machine, parameters: &mut Parameters| match limit {
-            Limit::Stroke => parameters.stroke_margin = 0.82,
-            Limit::LegRate => machine.actuator.max_rate = 0.2,
+            Limit::Stroke => parameters.stroke_margin_m = 0.82,
+            Limit::LegRate => machine.actuator.max_rate_m_s = 0.2,
             Limit::Envelope => parameters.envelope = around_home([0.01; 6]),
             Limit::Velocity => parameters.limits.position.velocity = 0.2,
-            _ => parameters.condition = 1.0,
+            _ => parameters.max_condition = 1.0,
         }
     };
     let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.1, 0.1, 0.4) };
@@ -68,15 +68,15 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
     let mut samples = RandomVectors::new(31);
     let (mut refused, mut begun) = (0, 0);
     for _ in 0..2000 {
-        let free = constants(|_, parameters| parameters.stroke_margin = 0.01);
+        let free = constants(|_, parameters| parameters.stroke_margin_m = 0.01);
         let mut machine = free.machine().clone();
         let stroke = machine.actuator.stroke();
         let pose = pose(&mut samples, &free);
         // The end stop is up to 4e-4 of the stroke from the longest leg, often nearer.
         let longest = leg_lengths(&machine, &pose).into_iter().fold(0.0, f64::max);
         let gap = 4e-4 * stroke * samples.uniform() * samples.uniform();
-        machine.actuator.max_length = longest + gap;
-        machine.actuator.min_length = machine.actuator.max_length - stroke;
+        machine.actuator.max_length_m = longest + gap;
+        machine.actuator.min_length_m = machine.actuator.max_length_m - stroke;
         let at_end = Constants::new(&machine, free.parameters);
         let speed = 0.03 * samples.uniform() * samples.uniform();
         let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.0, 0.0, speed) };
@@ -94,7 +94,7 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
             time_ns += MS / 10;
             reference.advance(&at_end, time_ns, None);
             let lengths = leg_lengths(&machine, &reference.motion().pose);
-            let excess = lengths.into_iter().fold(0.0, f64::max) - machine.actuator.max_length;
+            let excess = lengths.into_iter().fold(0.0, f64::max) - machine.actuator.max_length_m;
             assert!(excess <= 0.0, "{excess:e} m beyond the end stop, {gap:e} m from it at the start");
         }
     }
@@ -143,7 +143,7 @@ fn a_reference_beyond_a_bound_by_rounding_only_returns() {
         match limit {
             Limit::Stroke => {
                 let longest = leg_lengths(constants.machine(), &pose).into_iter().fold(0.0, f64::max);
-                reference.bounds.longest = [longest - 1e-7; LEGS];
+                reference.bounds.longest_m = [longest - 1e-7; LEGS];
             }
             Limit::Envelope => {
                 let x = task_coordinates(&pose, &constants.machine().home);
@@ -151,7 +151,7 @@ fn a_reference_beyond_a_bound_by_rounding_only_returns() {
             }
             _ => {
                 constants.max_reference_condition = condition * (1.0 - 1e-5);
-                constants.parameters.condition = condition * 1.1;
+                constants.parameters.max_condition = condition * 1.1;
             }
         }
         let mut away = reference.clone();
@@ -178,7 +178,7 @@ fn walls_keep_their_distance_under_limit_and_beyond_limits_only() {
             parameters.envelope = around_home([0.4, 0.4, 0.4, 0.2, 0.2, 0.2]);
         });
         let kept = 5e-3 * constants.machine().actuator.stroke();
-        for (axis, end, kept) in [(3, 0.2_f64, kept), (2, -0.4, kept / constants.machine().joints.radius)] {
+        for (axis, end, kept) in [(3, 0.2_f64, kept), (2, -0.4, kept / constants.machine().joints.radius_m)] {
             let near = 0.3 * kept;
             let mut offset = [0.0; 6];
             offset[axis] = end - near * end.signum();

@@ -14,20 +14,20 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
-        (constants.max_reference_condition, constants.parameters.condition) = (1e4, 1e9);
+        (constants.max_reference_condition, constants.parameters.max_condition) = (1e4, 1e9);
         let mut bounds = PoseBounds::configured(&constants);
-        (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
+        (bounds.shortest_m, bounds.longest_m) = ([0.0; LEGS], [100.0; LEGS]);
         let verified = |constants: &Constants, from: Option<&Pose>| {
             let step = Step { from, ..Step::default() };
             Verifier::default().verify(constants, &bounds, &at_rest(&pose), &step, &mut PoseStop::default())
         };
         let sine = universal_sine(&machine, &pose);
-        constants.universal_sine = 0.99 * sine;
+        constants.least_universal_sine = 0.99 * sine;
         assert_eq!(verified(&constants, None), Ok(StopKind::ReleaseFirst));
-        constants.universal_sine = 1.01 * sine;
+        constants.least_universal_sine = 1.01 * sine;
         assert_eq!(verified(&constants, None), Err(Limit::Condition.into()));
         assert_eq!(verified(&constants, Some(&pose)), Ok(StopKind::BrakeAtOnce));
-        constants.universal_sine = 2.02 * sine;
+        constants.least_universal_sine = 2.02 * sine;
         assert_eq!(verified(&constants, Some(&pose)), Err(Limit::Condition.into()));
     }
 }
@@ -56,11 +56,11 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         // The poses around a knot at the limit may be beyond it, but not beyond the platform's.
         let condition = Conditioning::new(&machine, &pose).sensitivity.condition;
         constants.max_reference_condition = 1.001 * condition;
-        constants.parameters.condition = 2.0 * condition;
+        constants.parameters.max_condition = 2.0 * condition;
         let mut with_ball = RegularBalls::default();
         assert!(!is_covered(&mut with_ball, &constants, &pose, Pair { angular: 0.0, linear: 0.01 }));
         assert!(covered(&mut with_ball, &constants, 0.01));
-        constants.parameters.condition = 1.001 * condition;
+        constants.parameters.max_condition = 1.001 * condition;
         assert!(!covered(&mut with_ball, &constants, 0.01));
     }
 }
@@ -73,7 +73,7 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
     let mut later = 0;
     for _ in 0..2000 {
         let mut scene = Scene::new(&mut samples);
-        scene.constants.parameters.condition = 60.0;
+        scene.constants.parameters.max_condition = 60.0;
         scene.constants.max_reference_condition = 50.0;
         let (mut verifier, mut brake_at_once) = (Verifier::default(), PoseStop::default());
         let mut verified = || {

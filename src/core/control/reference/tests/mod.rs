@@ -36,6 +36,6 @@ fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reac
 
 /// Proof of forces that no stop exceeds.
 fn unlimited_forces(constants: &Constants) -> ForceProof {
-    let bounds = ForceBounds { holding: f64::INFINITY, moving: f64::INFINITY };
+    let bounds = ForceBounds { holding_n: f64::INFINITY, moving_n: f64::INFINITY };
     ForceProof::new(constants, StopDemand::default(), bounds, StopKind::ReleaseFirst)
 }

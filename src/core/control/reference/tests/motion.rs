@@ -145,22 +145,22 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
     let mut samples = RandomVectors::new(34);
     let machine = machine(&mut samples);
     let mut parameters = parameters(&machine);
-    parameters.stroke_margin = 0.1;
+    parameters.stroke_margin_m = 0.1;
     parameters.envelope = Some(Envelope {
         lowest: [-0.1, -0.1, -0.1, -0.1, -0.1, 1.4],
         highest: [0.1, 0.1, 0.1, 0.1, 0.1, 1.6],
     });
     let constants = Constants::new(&machine, parameters);
     let nominal = PoseBounds::configured(&constants);
-    let [shortest, longest] = [machine.actuator.min_length + 0.1, machine.actuator.max_length - 0.1];
-    assert_eq!((nominal.shortest, nominal.longest), ([shortest; LEGS], [longest; LEGS]));
+    let [shortest, longest] = [machine.actuator.min_length_m + 0.1, machine.actuator.max_length_m - 0.1];
+    assert_eq!((nominal.shortest_m, nominal.longest_m), ([shortest; LEGS], [longest; LEGS]));
     let room = 2.5e-5 * machine.actuator.stroke();
     // Relaxed bounds keep two rooms from the end stops.
-    let (low, high) = (machine.actuator.min_length + 2.0 * room, machine.actuator.max_length - 2.0 * room);
+    let (low, high) = (machine.actuator.min_length_m + 2.0 * room, machine.actuator.max_length_m - 2.0 * room);
     let stops = [low, f64::NEG_INFINITY, -high, f64::NEG_INFINITY];
     let ends = |bounds: &PoseBounds| {
         let envelope = bounds.envelope.unwrap();
-        [bounds.shortest, envelope.lowest, bounds.longest.map(|x| -x), envelope.highest.map(|x| -x)]
+        [bounds.shortest_m, envelope.lowest, bounds.longest_m.map(|x| -x), envelope.highest.map(|x| -x)]
     };
     for sign in [-1.0, 1.0] {
         let at = |share: f64| {
@@ -172,7 +172,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
         let mut before = ends(&bounds);
         let x = task_coordinates(&at(1.0), &machine.home);
         let end = if sign < 0.0 { before[1][0] - x[0] } else { before[3][0] + x[0] };
-        assert!((end + room / machine.joints.radius).abs() < 1e-12, "{end}");
+        assert!((end + room / machine.joints.radius_m).abs() < 1e-12, "{end}");
         for share in [1.0, 0.9, 0.95, 0.5, 0.7, 0.0] {
             bounds.tighten(&constants, &at(share));
             let now = ends(&bounds);
@@ -184,7 +184,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
             {
                 for axis in 0..6 {
                     let is_angle = kind % 2 == 1 && axis < 3;
-                    let room = if is_angle { room / machine.joints.radius } else { room };
+                    let room = if is_angle { room / machine.joints.radius_m } else { room };
                     let (value, end) = (values[kind][axis], stops[kind]);
                     let expected = nominal[axis].min((value - room).max(end.min(value))).max(before[axis]);
                     let expected = if values[kind][axis] < nominal[axis] { expected } else { nominal[axis] };
@@ -200,7 +200,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
 /// A leg half a room from its end stop may return, and has no room towards the end stop.
 #[test]
 fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
-    let free = generator::constants(|_, parameters| parameters.stroke_margin = 0.01);
+    let free = generator::constants(|_, parameters| parameters.stroke_margin_m = 0.01);
     let pose = free.home.pose();
     let lengths = leg_lengths(free.machine(), pose);
     for is_long in [false, true] {
@@ -210,11 +210,11 @@ fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
         let (shortest, longest) =
             lengths.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), &l| (a.min(l), b.max(l)));
         let at_stop = if is_long { longest } else { shortest };
-        machine.actuator.min_length =
+        machine.actuator.min_length_m =
             if is_long { longest + half_room - stroke } else { shortest - half_room };
-        machine.actuator.max_length = machine.actuator.min_length + stroke;
+        machine.actuator.max_length_m = machine.actuator.min_length_m + stroke;
         let bounds = PoseBounds::relaxed_to(&Constants::new(&machine, free.parameters), pose);
-        let bounds = if is_long { bounds.longest } else { bounds.shortest };
+        let bounds = if is_long { bounds.longest_m } else { bounds.shortest_m };
         let leg = lengths.iter().position(|&length| length == at_stop).unwrap();
         assert_eq!(bounds[leg], at_stop, "{is_long}");
     }

@@ -85,9 +85,9 @@ fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
     for _ in 0..40 {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
-        (constants.max_reference_condition, constants.parameters.condition) = (1e9, 1e9);
+        (constants.max_reference_condition, constants.parameters.max_condition) = (1e9, 1e9);
         let center = pose(&mut samples, &constants);
-        constants.universal_sine = universal_sine(&machine, &center) * samples.uniform();
+        constants.least_universal_sine = universal_sine(&machine, &center) * samples.uniform();
         let [linear, angular] = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
         let ratio = Pair { angular, linear };
         let reach = |size: f64| ratio.map(|ratio| ratio * size);
@@ -95,7 +95,7 @@ fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
             is_covered(&mut RegularBalls::default(), &constants, &center, reach(size))
         });
         let sine = |pose: &Pose| universal_sine(&machine, pose);
-        let found = lowest(&mut samples, &center, reach(size), [1, 200], sine) / constants.universal_sine;
+        let found = lowest(&mut samples, &center, reach(size), [1, 200], sine) / constants.least_universal_sine;
         assert!(found >= 1.0 - 1e-9, "{found}, {size}, {ratio:?}, {center:?}");
         if size > 0.0 {
             (closest, accepted) = (closest.min(found), accepted + 1);

@@ -104,7 +104,7 @@ impl PlayedStep {
     /// The step that ends with a motion.
     fn step(&self, end: &Motion) -> Step<'_> {
         let inner_speeds = inner_speeds(&self.begin(end), end, self.duration);
-        Step { from: self.from.as_ref(), duration: self.duration, inner_speeds, ..Step::default() }
+        Step { from: self.from.as_ref(), duration_s: self.duration, inner_speeds, ..Step::default() }
     }
 
     /// Twist and acceleration at its start.
@@ -152,7 +152,7 @@ pub(super) struct Scene {
 impl Scene {
     pub fn new(samples: &mut RandomVectors) -> Self {
         let mut machine = machine(samples);
-        machine.actuator.max_rate = 100.0;
+        machine.actuator.max_rate_m_s = 100.0;
         let mut parameters = parameters(&machine);
         parameters.envelope = Some(Envelope { lowest: [-10.0; 6], highest: [10.0; 6] });
         if samples.below(2) == 0 {
@@ -166,13 +166,13 @@ impl Scene {
         let (motion, step) = motion(samples, &constants);
         constants.max_reference_condition = 1e4;
         let mut bounds = PoseBounds::configured(&constants);
-        (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
+        (bounds.shortest_m, bounds.longest_m) = ([0.0; LEGS], [100.0; LEGS]);
         Self { constants, bounds, motion, step, is_free: samples.below(3) == 0 }
     }
 
     pub fn set_max_rate(&mut self, rate: f64) {
         let mut machine = self.constants.machine().clone();
-        machine.actuator.max_rate = rate;
+        machine.actuator.max_rate_m_s = rate;
         let condition = self.constants.max_reference_condition;
         self.constants = Constants::new(&machine, self.constants.parameters);
         self.constants.max_reference_condition = condition;
@@ -252,13 +252,13 @@ impl Bound {
     fn set(self, scene: &mut Scene, value: f64) {
         let (constants, bounds) = (&mut scene.constants, &mut scene.bounds);
         match self {
-            Self::Longest(leg) => bounds.longest[leg] = value,
-            Self::Shortest(leg) => bounds.shortest[leg] = value,
+            Self::Longest(leg) => bounds.longest_m[leg] = value,
+            Self::Shortest(leg) => bounds.shortest_m[leg] = value,
             Self::Rate => scene.set_max_rate(value),
             Self::Highest(axis) => bounds.envelope.as_mut().unwrap().highest[axis] = value,
             Self::Lowest(axis) => bounds.envelope.as_mut().unwrap().lowest[axis] = value,
             Self::Condition => {
-                (constants.max_reference_condition, constants.parameters.condition) = (value, value);
+                (constants.max_reference_condition, constants.parameters.max_condition) = (value, value);
             }
             Self::ReferenceCondition => constants.max_reference_condition = value,
             Self::Speed(0) => constants.parameters.limits.position.velocity = value,
@@ -288,7 +288,7 @@ impl Bound {
         let room = ROOM_RATIO * constants.machine().actuator.stroke();
         match self {
             Self::Longest(_) | Self::Shortest(_) => room,
-            Self::Highest(0..3) | Self::Lowest(0..3) => room / constants.arm,
+            Self::Highest(0..3) | Self::Lowest(0..3) => room / constants.arm_m,
             Self::Speed(_) => 2e-9,
             _ => 1e-9,
         }

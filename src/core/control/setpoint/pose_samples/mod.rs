@@ -100,7 +100,7 @@ impl PoseSamples {
             self.samples = [None; CAPACITY];
             return self.append(time_ns, pose);
         }
-        let is_first = self.timing.averaged_intervals == 0.0;
+        let is_first = self.timing.interval_count == 0.0;
         self.timing.update(interval, seconds_between(last.time_ns, now_ns));
         let delay = self.timing.interpolation_delay_s();
         self.delay = if is_first { Delay::new(delay, now_ns) } else { self.delay.toward(delay, now_ns) };
@@ -195,8 +195,8 @@ impl PoseSamples {
 
     /// Pose and twist after the newest sample: first on with its twist, then back to it.
     fn after_newest(&self, newest: &Sample, wanted_ns: u64) -> (Pose, Twist) {
-        let onward = EXTRAPOLATION_INTERVALS * self.timing.interval;
-        let back = RETURN_TO_NEWEST_SAMPLE_INTERVALS * self.timing.interval;
+        let onward = EXTRAPOLATION_INTERVALS * self.timing.interval_s;
+        let back = RETURN_TO_NEWEST_SAMPLE_INTERVALS * self.timing.interval_s;
         let elapsed = seconds_between(newest.time_ns, wanted_ns);
         let travel = |time: f64| Twist::from_vector(&(newest.slope.vector() * time));
         if elapsed >= onward + back {

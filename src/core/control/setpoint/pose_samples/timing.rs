@@ -26,8 +26,8 @@ const JITTER_PER_DEVIATION: f64 = 2.25;
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::setpoint::pose_samples) struct SampleTiming {
     /// Number of intervals seen, up to the length of the average.
-    pub averaged_intervals: f64,
-    pub interval: f64,
+    pub interval_count: f64,
+    pub interval_s: f64,
     /// Mean age of the newest sample when the next one arrives.
     age: f64,
     /// Mean deviation of that age.
@@ -38,23 +38,23 @@ pub(in crate::control::setpoint::pose_samples) struct SampleTiming {
 
 impl SampleTiming {
     pub fn update(&mut self, interval: f64, age: f64) {
-        if self.averaged_intervals == 0.0 {
-            (self.interval, self.age, self.before) = (interval, age, [[interval, age]; 2]);
+        if self.interval_count == 0.0 {
+            (self.interval_s, self.age, self.before) = (interval, age, [[interval, age]; 2]);
         }
-        self.averaged_intervals = (self.averaged_intervals + 1.0).min(1.0 / ESTIMATION_GAIN);
-        let gain = 1.0 / self.averaged_intervals;
-        let deviation = (age - self.age).abs().min(MAX_JITTER_RATIO * self.interval);
+        self.interval_count = (self.interval_count + 1.0).min(1.0 / ESTIMATION_GAIN);
+        let gain = 1.0 / self.interval_count;
+        let deviation = (age - self.age).abs().min(MAX_JITTER_RATIO * self.interval_s);
         self.deviation += gain * (deviation - self.deviation);
         // Medians of three: a single lost sample changes no estimate, and a new rate changes it at once.
         let [[interval_2, age_2], [interval_1, age_1]] = self.before;
-        self.interval += gain * (median(interval_2, interval_1, interval) - self.interval);
+        self.interval_s += gain * (median(interval_2, interval_1, interval) - self.interval_s);
         self.age += gain * (median(age_2, age_1, age) - self.age);
         self.before = [[interval_1, age_1], [interval, age]];
     }
 
     /// Delay \[s\] at which the samples around an instant, and the one after, have nearly always arrived.
     pub fn interpolation_delay_s(&self) -> f64 {
-        (self.interval + self.age + JITTER_PER_DEVIATION * self.deviation).clamp(0.0, MAX_DELAY_S)
+        (self.interval_s + self.age + JITTER_PER_DEVIATION * self.deviation).clamp(0.0, MAX_DELAY_S)
     }
 }
 

@@ -86,7 +86,7 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
         let Scene { constants, bounds, motion } = &scene;
         let walls = scene.walls();
         assert_eq!(walls.count, 12);
-        let radius = constants.machine().joints.radius;
+        let radius = constants.machine().joints.radius_m;
         let moved = |twist: &Twist, t: f64| {
             let turned = Twist { angular: twist.angular * t, linear: twist.linear * t };
             scene.quantities(&motion.pose.displaced(&turned))
@@ -133,8 +133,8 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
             let departure = curvature * stop_s * stop_s / 8.0 + asynchronous;
             let departure = if quantity < LEGS { departure.max(0.0) } else { 0.0 };
             let bound = match (quantity, k % 2) {
-                (leg @ 0..6, 0) => bounds.longest[leg],
-                (leg @ 0..6, _) => -bounds.shortest[leg],
+                (leg @ 0..6, 0) => bounds.longest_m[leg],
+                (leg @ 0..6, _) => -bounds.shortest_m[leg],
                 (other, 0) => envelope.highest[other - LEGS],
                 (other, _) => -envelope.lowest[other - LEGS],
             };
@@ -168,8 +168,8 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
     for _ in 0..2000 {
         let mut scene = Scene::new(&mut samples);
         let lengths = leg_lengths(scene.constants.machine(), &scene.motion.pose);
-        scene.bounds.shortest = lengths.map(|length| length - (0.01 + 0.09 * samples.uniform()));
-        scene.bounds.longest = lengths.map(|length| length + (0.01 + 0.09 * samples.uniform()));
+        scene.bounds.shortest_m = lengths.map(|length| length - (0.01 + 0.09 * samples.uniform()));
+        scene.bounds.longest_m = lengths.map(|length| length + (0.01 + 0.09 * samples.uniform()));
         scene.bounds.envelope = None;
         let whole = scene.motion.twist;
         let scale = |scene: &mut Scene, factor: f64| {
@@ -177,7 +177,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
         };
         let is_slow = |scene: &Scene| {
             let velocity = stacked(
-                &(scene.motion.twist.angular * scene.constants.machine().joints.radius),
+                &(scene.motion.twist.angular * scene.constants.machine().joints.radius_m),
                 &scene.motion.twist.linear,
             );
             ends(&scene.walls()).iter().all(|end| end.gradient.dot(&velocity) <= end.end.rate)
@@ -202,7 +202,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
             pose = advanced(&pose, &state, &next, dt);
             state = next;
             let lengths = leg_lengths(constants.machine(), &pose);
-            let ends = bounds.shortest.iter().zip(&bounds.longest);
+            let ends = bounds.shortest_m.iter().zip(&bounds.longest_m);
             for (length, (shortest, longest)) in lengths.iter().zip(ends) {
                 let room = (length - shortest).min(longest - length);
                 worst = worst.min(room / constants.machine().actuator.stroke());

@@ -25,7 +25,7 @@ fn start(samples: &mut RandomVectors, limits: &DerivativeLimits) -> [Vector3<f64
 /// Stop that is planned in the memory of a longer one.
 fn planned(kind: StopKind, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) -> Stop {
     let mut stop =
-        Stop { count: 9, begins: [0.0; MAX_PIECES], peak_velocity: 9.0, duration: 9.0, ..Stop::default() };
+        Stop { count: 9, begins: [0.0; MAX_PIECES], peak_velocity: 9.0, duration_s: 9.0, ..Stop::default() };
     dispatch!(Level::new(), simd => match kind {
         StopKind::ReleaseFirst => stop.release_first(simd, v, a, limits),
         StopKind::BrakeAtOnce => stop.brake_at_once(simd, v, a, limits),
@@ -53,12 +53,12 @@ fn a_stop_keeps_acceleration_jerk_and_its_peak_velocity_and_ends_at_rest() {
                 let first = state(&stop, 0.0);
                 assert!((first.velocity - v).norm() <= 1e-12 && (first.acceleration - a).norm() <= 1e-12);
                 let last = stop.begins[stop.count - 1];
-                assert_eq!(last, stop.duration);
-                let before = state(&stop, stop.duration * (1.0 - 1e-12));
+                assert_eq!(last, stop.duration_s);
+                let before = state(&stop, stop.duration_s * (1.0 - 1e-12));
                 let mut check = |k: usize, ratio: f64| worst[k] = worst[k].max(ratio);
                 check(0, before.velocity.norm() / limits.velocity);
                 for k in 0..=40 {
-                    let state = state(&stop, stop.duration * f64::from(k) / 40.0);
+                    let state = state(&stop, stop.duration_s * f64::from(k) / 40.0);
                     check(1, state.acceleration.norm() / limits.acceleration);
                     check(2, state.velocity.norm() - stop.peak_velocity * (1.0 + 1e-9));
                 }
@@ -85,10 +85,10 @@ fn the_extent_bounds_the_stop_that_releases_first() {
             let [v, a] = start(&mut samples, &limits);
             let extent = release_first_extent(&v, &a, &limits);
             let stop = planned(StopKind::ReleaseFirst, &v, &a, &limits);
-            assert!((stop.duration - extent.duration).abs() <= 1e-9 * extent.duration);
+            assert!((stop.duration_s - extent.duration_s).abs() <= 1e-9 * extent.duration_s);
             for k in 0..=20 {
-                let state = state(&stop, stop.duration * f64::from(k) / 20.0);
-                let used = state.displacement.norm() / extent.length.max(1e-30);
+                let state = state(&stop, stop.duration_s * f64::from(k) / 20.0);
+                let used = state.displacement.norm() / extent.distance_bound.max(1e-30);
                 assert!(used <= 1.0 + 1e-9 && state.velocity.norm() <= extent.peak_velocity * (1.0 + 1e-9));
                 largest_use = largest_use.max(used);
             }
