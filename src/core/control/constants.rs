@@ -132,9 +132,9 @@ impl Constants {
 }
 
 /// Largest condition of the reference: a part of the way from that at home to the limit of the platform.
-pub fn max_reference_condition(home: &KinematicState, limit: f64) -> f64 {
+pub fn max_reference_condition(home: &KinematicState, max_condition: f64) -> f64 {
     let at_home = home.sensitivity().condition;
-    at_home + REFERENCE_CONDITION_RANGE_SHARE * (limit - at_home)
+    at_home + REFERENCE_CONDITION_RANGE_SHARE * (max_condition - at_home)
 }
 
 /// Least sine of the angle between a leg and the first axis of its universal joint that the reference keeps.

@@ -53,7 +53,7 @@ pub struct InverseDynamics {
     inverse_smoothing: f64,
 }
 
-/// Load of one motion on the actuators: `N (Gamma - axial_forces) = wrench`.
+/// Load of one motion on the actuators: `N (Gamma - axial_forces_n) = wrench`.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskLoad {
     /// Matrix N, see [`super::inverse_jacobian::leg_wrenches`].
@@ -65,7 +65,7 @@ pub struct TaskLoad {
 }
 
 impl TaskLoad {
-    /// Whole load as a wrench about C \[N m\], \[N\]: `W + N axial_forces`.
+    /// Whole load as a wrench about C \[N m\], \[N\]: `W + N axial_forces_n`.
     pub fn total(&self) -> Vector6<f64> {
         self.wrench + self.leg_wrenches * self.axial_forces_n
     }
@@ -199,14 +199,14 @@ impl InverseDynamics {
         &self,
         simd: S,
         [viscous, coulomb]: [f64x8<S>; 2],
-        rate: f64x8<S>,
-        accel: f64x8<S>,
+        rate_m_s: f64x8<S>,
+        accel_m_s2: f64x8<S>,
     ) -> f64x8<S> {
         let splat = |value: f64| f64x8::splat(simd, value);
         let one = splat(1.0);
-        let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
-        let friction = viscous.fused_mul_add(rate, coulomb * sign);
-        splat(self.machine.actuator.reflected_mass_kg).fused_mul_add(accel, friction)
+        let sign = (rate_m_s * splat(self.inverse_smoothing)).max(-one).min(one);
+        let friction = viscous.fused_mul_add(rate_m_s, coulomb * sign);
+        splat(self.machine.actuator.reflected_mass_kg).fused_mul_add(accel_m_s2, friction)
     }
 }
 

@@ -150,14 +150,14 @@ impl<'a, S: Simd> Factorization<'a, S> {
         -d_a * d_s
     }
 
-    /// Returns `Gamma + axial` with `N Gamma = W`, in lanes; `None` at a singular pose.
+    /// Returns `Gamma + axial_n` with `N Gamma = W`, in lanes; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial: f64x8<S>) -> Option<LegLanes> {
+    pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial_n: f64x8<S>) -> Option<LegLanes> {
         let simd = self.simd;
         let triples = &self.joints.triples;
         if !self.uses_blocks {
             let n = wrench_columns(triples, legs);
-            let forces = forces_by_lu(simd.level(), &n, &wrench.sum(), &triples.unpack(&axial.into()))?;
+            let forces = forces_by_lu(simd.level(), &n, &wrench.sum(), &triples.unpack(&axial_n.into()))?;
             return Some(triples.pack(&forces));
         }
         let force = wrench.force.total();
@@ -169,24 +169,24 @@ impl<'a, S: Simd> Factorization<'a, S> {
         let [g0, g1, g2] = broadcasts(gamma_b);
         let [x0, x1, x2] = Triple::transposed(self.x);
         let gamma_a = g - g0 * x0 - g1 * x1 - g2 * x2;
-        Some((gamma_a.combine(gamma_b) + axial).into())
+        Some((gamma_a.combine(gamma_b) + axial_n).into())
     }
 
-    /// Returns `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
+    /// Returns `[omega; v]` with `N^T [omega; v] = rates_m_s`; `None` at a singular pose.
     #[inline(always)]
-    pub fn twist(&self, legs: &LegGeometry<S>, rates: f64x8<S>) -> Option<LaneTwist<S>> {
+    pub fn twist(&self, legs: &LegGeometry<S>, rates_m_s: f64x8<S>) -> Option<LaneTwist<S>> {
         let simd = self.simd;
         if !self.uses_blocks {
             let triples = &self.joints.triples;
             let n = wrench_columns(triples, legs);
-            return twist_by_lu(simd.level(), &n, &triples.unpack(&rates.into())).map(
+            return twist_by_lu(simd.level(), &n, &triples.unpack(&rates_m_s.into())).map(
                 #[inline(always)]
                 |twist| LaneTwist::splat(simd, &twist),
             );
         }
         // The lane of padding is not a leg: its rate is set to zero.
         let of_legs = f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
-        let (r_a, r_b) = rates.split();
+        let (r_a, r_b) = rates_m_s.split();
         let [r0, r1, r2] = broadcasts(r_a);
         let [x0, x1, x2] = self.x;
         // One dS for all three lanes. Near a singular pose the lanes' own values differ by rounding times the
@@ -261,7 +261,7 @@ pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) 
     n
 }
 
-/// Whether both determinants are large enough for block elimination; `radius_cubed` is a field of [`Joints`].
+/// Whether both determinants are large enough for block elimination; `radius_cubed_m3` is a field of [`Joints`].
 #[inline(always)]
 pub(super) fn are_regular_blocks(d_a: f64, d_s: f64, radius_cubed: f64) -> bool {
     d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * radius_cubed

@@ -127,16 +127,16 @@ impl ForceChangeBounds {
     }
 
     /// Changes of the forces at rest.
-    pub fn at_rest(&self, turn: f64, turned_leg: f64) -> ForceBound {
+    pub fn at_rest(&self, turn_rad: f64, turned_leg: f64) -> ForceBound {
         let ([turned, ..], [leg, _]) = (self.by_turn, self.by_turned_leg);
         ForceBound {
-            wrench: turned * turn + leg * turned_leg,
+            wrench: turned * turn_rad + leg * turned_leg,
             axial_n: self.axial_weight * turned_leg + self.coulomb_friction,
         }
     }
 
     /// Changes of the forces under accelerations, and forces of velocities.
-    pub fn moving(&self, motion: &LargestMotion, turn: f64, turned_leg: f64) -> ForceBound {
+    pub fn moving(&self, motion: &LargestMotion, turn_rad: f64, turned_leg: f64) -> ForceBound {
         let LargestMotion { angular_rad_s2: angular, linear_m_s2: linear, angular_velocity_rad_s: angular_velocity, velocity_m_s: velocity } = *motion;
         let turning = angular_velocity * angular_velocity;
         let joint_acceleration = linear + self.arm_m * angular;
@@ -145,11 +145,11 @@ impl ForceChangeBounds {
         let ([_, by_linear, by_angular], [_, by_joint]) = (self.by_turn, self.by_turned_leg);
         let [[wrench, joint_wrench], [axial, joint_axial]] = self.by_velocity;
         ForceBound {
-            wrench: (by_linear * linear + by_angular * angular) * turn
+            wrench: (by_linear * linear + by_angular * angular) * turn_rad
                 + by_joint * joint_acceleration * turned_leg
                 + wrench * turning
                 + joint_wrench * joint,
-            axial_n: self.axial_mass * (joint_acceleration * turned_leg + self.arm_m * angular * turn)
+            axial_n: self.axial_mass * (joint_acceleration * turned_leg + self.arm_m * angular * turn_rad)
                 + axial * turning
                 + joint_axial * joint
                 + self.viscous_friction * joint_speed.min(self.max_rate_m_s),

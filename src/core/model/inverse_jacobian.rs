@@ -53,8 +53,8 @@ pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
 /// Twist of the platform for measured leg rates: solves `J^-1 [omega; v] = L'`.
 ///
 /// `None` at a singular pose. The condition of the pose amplifies errors of the rates.
-pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
-    let rates = machine.joints.triples.pack(rates);
+pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates_m_s: &[f64; LEGS]) -> Option<Twist> {
+    let rates = machine.joints.triples.pack(rates_m_s);
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::new(simd, &machine.joints, pose);
         let twist = Factorization::new(simd, &machine.joints, &legs).twist(&legs, rates.load(simd));

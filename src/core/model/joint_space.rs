@@ -32,7 +32,7 @@ use super::machine::Machine;
 use super::platform::acceleration_map;
 use super::rigid::Motion;
 
-/// Dynamics of a leg in joint coordinates, in the order beta, gamma, theta. All but the second and third element of `mass` are NaN for
+/// Dynamics of a leg in joint coordinates, in the order beta, gamma, theta. All but the second and third element of `mass_kg` are NaN for
 /// a leg along the first axis of its universal joint.
 ///
 /// ```
@@ -57,7 +57,7 @@ pub struct LegDynamics {
 }
 
 /// Dynamics of the six legs for a motion and its actuator forces Gamma \[N\].
-pub fn joint_space(machine: &Machine, motion: &Motion, forces: &[f64; LEGS]) -> [LegDynamics; LEGS] {
+pub fn joint_space(machine: &Machine, motion: &Motion, forces_n: &[f64; LEGS]) -> [LegDynamics; LEGS] {
     let joints = &machine.joints;
     let [bases, platforms, axes] = [&joints.base, &joints.platform, &joints.universal_axis]
         .map(|lanes| joints.triples.unpack_vectors(lanes));
@@ -65,7 +65,7 @@ pub fn joint_space(machine: &Machine, motion: &Motion, forces: &[f64; LEGS]) -> 
     let mut legs = [LegDynamics::default(); LEGS];
     let places = bases.iter().zip(&platforms).zip(&axes);
     for ((leg, ((base, platform), u)), (force, friction)) in
-        legs.iter_mut().zip(places).zip(forces.iter().zip(friction))
+        legs.iter_mut().zip(places).zip(forces_n.iter().zip(friction))
     {
         *leg = LegDynamics::new(machine, motion, [base, platform, u], *force, friction);
     }

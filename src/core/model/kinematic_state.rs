@@ -97,9 +97,9 @@ impl KinematicState {
     }
 
     /// Twist of the platform for measured leg rates, see [`super::inverse_jacobian::twist_from_rates`].
-    pub fn twist(&self, machine: &Machine, rates: &[f64; LEGS]) -> Option<Twist> {
+    pub fn twist(&self, machine: &Machine, rates_m_s: &[f64; LEGS]) -> Option<Twist> {
         let joints = &machine.joints;
-        let rates = joints.triples.pack(rates);
+        let rates = joints.triples.pack(rates_m_s);
         dispatch!(machine.level, simd => {
             let legs = self.legs.load(simd);
             let factorization = Factorization::load(simd, joints, &self.factorization);

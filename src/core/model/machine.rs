@@ -109,10 +109,10 @@ pub struct Joints {
 
 impl Machine {
     /// Machine whose stroke is shorter at both ends by a margin \[m\].
-    pub fn within_margin(&self, margin: f64) -> Self {
+    pub fn within_margin(&self, margin_m: f64) -> Self {
         let mut machine = self.clone();
-        machine.actuator.min_length_m += margin;
-        machine.actuator.max_length_m -= margin;
+        machine.actuator.min_length_m += margin_m;
+        machine.actuator.max_length_m -= margin_m;
         machine
     }
 
@@ -199,9 +199,9 @@ pub struct Link {
     pub transverse_inertia: TransverseInertia,
 }
 
-/// Transverse inertia `constant + quadratic (L - reference_length)^2`, L the length of the leg.
+/// Transverse inertia `constant_kg_m2 + quadratic_kg (L - reference_length_m)^2`, L the length of the leg.
 ///
-/// With `quadratic != 0` (the paper's Table 1) the body is not rigid. Newton-Euler uses the instantaneous
+/// With `quadratic_kg != 0` (the paper's Table 1) the body is not rigid. Newton-Euler uses the instantaneous
 /// value, as in the paper. `dI/dt` terms are left out, so power does not balance exactly.
 #[derive(Clone, Debug)]
 pub struct TransverseInertia {
@@ -215,8 +215,8 @@ pub struct TransverseInertia {
 
 impl TransverseInertia {
     /// Inertia at the length L of the leg \[kg m^2\].
-    pub fn at(&self, length: f64) -> f64 {
-        let change = length - self.reference_length_m;
+    pub fn at(&self, length_m: f64) -> f64 {
+        let change = length_m - self.reference_length_m;
         self.constant_kg_m2 + self.quadratic_kg * change * change
     }
 }
@@ -250,7 +250,7 @@ pub struct Actuator {
 }
 
 impl Actuator {
-    /// Value of `coulomb_smoothing` for controllers. sign(L') is exact above 0.1 mm/s, which is slow enough
+    /// Value of `coulomb_smoothing_m_s` for controllers. sign(L') is exact above 0.1 mm/s, which is slow enough
     /// for the legs of a telescope. One count of a usual encoder at 1 kHz does not make the force chatter.
     pub const COULOMB_SMOOTHING_M_S: f64 = 1e-4;
 
@@ -278,8 +278,8 @@ impl Actuator {
     }
 
     /// sign(L') of dry friction, proportional to L' below the smoothing speed.
-    pub fn sign(&self, rate: f64) -> f64 {
-        (rate / self.coulomb_smoothing_m_s).clamp(-1.0, 1.0)
+    pub fn sign(&self, rate_m_s: f64) -> f64 {
+        (rate_m_s / self.coulomb_smoothing_m_s).clamp(-1.0, 1.0)
     }
 
     /// Length of the stroke \[m\].
@@ -288,8 +288,8 @@ impl Actuator {
     }
 
     /// Whether a leg length is within the stroke; false for NaN.
-    pub fn contains(&self, length: f64) -> bool {
-        (self.min_length_m..=self.max_length_m).contains(&length)
+    pub fn contains(&self, length_m: f64) -> bool {
+        (self.min_length_m..=self.max_length_m).contains(&length_m)
     }
 
     /// Distance of a leg length from the nearer end of the stroke \[m\]; negative outside the stroke.
@@ -300,7 +300,7 @@ impl Actuator {
     /// assert!((actuator.margin(middle) - 0.5 * actuator.stroke()).abs() < 1e-15);
     /// assert!(actuator.margin(actuator.max_length + 0.01) < 0.0);
     /// ```
-    pub fn margin(&self, length: f64) -> f64 {
-        (length - self.min_length_m).min(self.max_length_m - length)
+    pub fn margin(&self, length_m: f64) -> f64 {
+        (length_m - self.min_length_m).min(self.max_length_m - length_m)
     }
 }

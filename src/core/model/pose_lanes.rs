@@ -56,12 +56,12 @@ struct Motions<S: Simd> {
 }
 
 impl InverseDynamics {
-    /// Actuator forces Gamma \[N\] of each motion, to the same place in `forces`; `None` at singular poses. Elements
+    /// Actuator forces Gamma \[N\] of each motion, to the same place in `forces_n`; `None` at singular poses. Elements
     /// beyond the shorter slice are left as they are.
     ///
     /// [`InverseDynamics::forces_of`] differs by rounding.
-    pub fn forces_of_all(&self, fidelity: Fidelity, motions: &[Motion], forces: &mut [Option<[f64; LEGS]>]) {
-        with_terms!(fidelity, M => self.write_forces::<M>(motions, forces));
+    pub fn forces_of_all(&self, fidelity: Fidelity, motions: &[Motion], forces_n: &mut [Option<[f64; LEGS]>]) {
+        with_terms!(fidelity, M => self.write_forces::<M>(motions, forces_n));
     }
 
     fn write_forces<M: ModelTerms>(&self, motions: &[Motion], forces: &mut [Option<[f64; LEGS]>]) {
@@ -169,7 +169,7 @@ impl InverseDynamics {
     }
 }
 
-/// Returns `Gamma + axial` with `N Gamma = W`, and the determinants of the blocks.
+/// Returns `Gamma + axial_n` with `N Gamma = W`, and the determinants of the blocks.
 #[inline(always)]
 fn balanced<S: Simd>(
     simd: S,

@@ -71,13 +71,13 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Motion `dt` seconds later (or earlier) under constant acceleration. The rotation is about a fixed
+    /// Motion `dt_s` seconds later (or earlier) under constant acceleration. The rotation is about a fixed
     /// axis: the rotation of the axis itself, `|omega x omega'| dt^3 / 12`, is left out.
-    pub fn after(&self, dt: f64) -> Self {
+    pub fn after(&self, dt_s: f64) -> Self {
         let (v, a) = (self.twist.vector(), self.acceleration.vector());
         Self {
-            pose: self.pose.extrapolated(&Twist::from_vector(&((v + a * (0.5 * dt)) * dt))),
-            twist: Twist::from_vector(&(v + a * dt)),
+            pose: self.pose.extrapolated(&Twist::from_vector(&((v + a * (0.5 * dt_s)) * dt_s))),
+            twist: Twist::from_vector(&(v + a * dt_s)),
             acceleration: self.acceleration,
         }
     }

@@ -44,18 +44,18 @@ impl TaskState {
         Self { x: x.into(), ..Self::default() }
     }
 
-    /// The state `dt` seconds later (or earlier) if X'' stays as it is.
-    pub fn after(&self, dt: f64) -> Self {
+    /// The state `dt_s` seconds later (or earlier) if X'' stays as it is.
+    pub fn after(&self, dt_s: f64) -> Self {
         Self {
-            x: self.x + (self.xd + self.xdd * (0.5 * dt)) * dt,
-            xd: self.xd + self.xdd * dt,
+            x: self.x + (self.xd + self.xdd * (0.5 * dt_s)) * dt_s,
+            xd: self.xd + self.xdd * dt_s,
             xdd: self.xdd,
         }
     }
 
-    /// The same state with derivatives with respect to a time that runs `rate` times as fast as theirs.
-    pub fn at_rate(&self, rate: f64) -> Self {
-        Self { x: self.x, xd: self.xd * rate, xdd: self.xdd * rate * rate }
+    /// The same state with derivatives with respect to a time that runs `rate_ratio` times as fast as theirs.
+    pub fn at_rate(&self, rate_ratio: f64) -> Self {
+        Self { x: self.x, xd: self.xd * rate_ratio, xdd: self.xdd * rate_ratio * rate_ratio }
     }
 
     /// Pose, twist and acceleration in base axes.

@@ -37,13 +37,13 @@ pub struct Transmission {
 
 impl Transmission {
     /// Ratios for rates of the legs \[m/s\].
-    pub fn new(actuator: &Actuator, rates: &[f64; LEGS]) -> Self {
+    pub fn new(actuator: &Actuator, rates_m_s: &[f64; LEGS]) -> Self {
         if !actuator.transmits_otherwise() {
             return Self { ratios: None };
         }
         let mut ratios = [actuator.force_scale; 2];
         let [pulling, pushing] = &mut ratios;
-        let legs = actuator.load_friction_share.iter().zip(rates);
+        let legs = actuator.load_friction_share.iter().zip(rates_m_s);
         for ((load_friction, rate), (pull, push)) in legs.zip(pulling.iter_mut().zip(pushing)) {
             let loss = load_friction * actuator.sign(*rate);
             *pull *= 1.0 + loss;
@@ -62,13 +62,13 @@ impl Transmission {
     }
 
     /// Forces that the legs get \[N\].
-    pub fn leg_forces(&self, commands: &[f64; LEGS]) -> [f64; LEGS] {
-        self.scaled(commands, |command, ratio| command * ratio)
+    pub fn leg_forces(&self, commands_n: &[f64; LEGS]) -> [f64; LEGS] {
+        self.scaled(commands_n, |command, ratio| command * ratio)
     }
 
     /// Commands that give the legs these forces \[N\].
-    pub fn commands(&self, forces: &[f64; LEGS]) -> [f64; LEGS] {
-        self.scaled(forces, |force, ratio| force / ratio)
+    pub fn commands(&self, forces_n: &[f64; LEGS]) -> [f64; LEGS] {
+        self.scaled(forces_n, |force, ratio| force / ratio)
     }
 
     #[inline(always)]

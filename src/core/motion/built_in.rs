@@ -87,14 +87,14 @@ pub struct FittedMotion {
 }
 
 impl FittedMotion {
-    /// X, X', X'' at `t` seconds after the start; at rest at home outside \[0, duration\].
-    pub fn at(&self, t: f64) -> TaskState {
+    /// X, X', X'' at `t_s` seconds after the start; at rest at home outside \[0, duration\].
+    pub fn at(&self, t_s: f64) -> TaskState {
         let mut state = match self.motion {
             BuiltInMotion::Settle => TaskState::default(),
-            BuiltInMotion::MinimumJerk => self.moves(t),
-            BuiltInMotion::Sines => self.faded(t, &self.sines(t)),
-            BuiltInMotion::Circle => self.faded(t, &self.circle(t)),
-            BuiltInMotion::Paper => self.faded(t, &self.paper(t)),
+            BuiltInMotion::MinimumJerk => self.moves(t_s),
+            BuiltInMotion::Sines => self.faded(t_s, &self.sines(t_s)),
+            BuiltInMotion::Circle => self.faded(t_s, &self.circle(t_s)),
+            BuiltInMotion::Paper => self.faded(t_s, &self.paper(t_s)),
         };
         state.x += self.home;
         state
@@ -168,10 +168,10 @@ fn harmonic(amplitude: &Vector6<f64>, omega: &Vector6<f64>, phase: &Vector6<f64>
 }
 
 /// The motion at its nominal size, or shrunk until stroke, rates and forces keep a reserve of a fifth.
-pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMotion {
+pub fn fit(machine: &Machine, motion: BuiltInMotion, duration_s: f64) -> FittedMotion {
     let sized = |share: f64| FittedMotion {
         motion,
-        duration_s: duration,
+        duration_s,
         position_amplitude_m: share * POSITION_OVER_RADIUS * machine.joints.radius_m,
         angle_share: share,
         home: machine.home.into(),

@@ -37,12 +37,12 @@ pub struct FourierSeries(pub Coefficients);
 
 impl FourierSeries {
     /// The displacement and its two derivatives at a time \[s\].
-    pub fn at(&self, t: f64) -> TaskState {
+    pub fn at(&self, t_s: f64) -> TaskState {
         let [cosine, sine] = [0, HARMONICS].map(|first| self.0.fixed_columns::<HARMONICS>(first));
         let mut state = TaskState::default();
         for ((k, a), b) in (1_u32..).zip(cosine.column_iter()).zip(sine.column_iter()) {
             let omega = f64::from(k) * TAU / PERIOD_S;
-            let (sin, cos) = libm::sincos(omega * t);
+            let (sin, cos) = libm::sincos(omega * t_s);
             let displacement = a * cos + b * sin;
             state.x += displacement;
             state.xd += (b * cos - a * sin) * omega;
@@ -103,13 +103,13 @@ impl Excitation {
         self.blended_out() + self.delay_motion.duration_s
     }
 
-    /// X, X', X'' at `t` seconds after the start; at rest at home outside \[0, duration\].
-    pub fn at(&self, t: f64) -> TaskState {
+    /// X, X', X'' at `t_s` seconds after the start; at rest at home outside \[0, duration\].
+    pub fn at(&self, t_s: f64) -> TaskState {
         let end = self.blended_out();
-        if t >= end {
-            return self.delay_motion.at(t - end);
+        if t_s >= end {
+            return self.delay_motion.at(t_s - end);
         }
-        let mut state = scaled_by_profile(&self.series.at(t - BLEND_S), &window(t, end, BLEND_S));
+        let mut state = scaled_by_profile(&self.series.at(t_s - BLEND_S), &window(t_s, end, BLEND_S));
         state.x += self.home;
         state
     }

@@ -40,7 +40,7 @@ pub struct Profile {
     pub accel_per_s2: f64,
 }
 
-/// The profile from 0 at `t = 0` to 1 at `t = duration`; constant outside.
+/// The profile from 0 at `t_s = 0` to 1 at `t_s = duration_s`; constant outside.
 ///
 /// ```
 /// use hexad_core::motion::minimum_jerk::{Profile, rise};
@@ -49,8 +49,8 @@ pub struct Profile {
 /// // Symmetric: halfway at half the time, fastest there, and no acceleration.
 /// assert_eq!(rise(1.0, 2.0), Profile { value: 0.5, rate: 1.875 / 2.0, accel: 0.0 });
 /// ```
-pub fn rise(t: f64, duration: f64) -> Profile {
-    let u = t / duration;
+pub fn rise(t_s: f64, duration_s: f64) -> Profile {
+    let u = t_s / duration_s;
     if !(u > 0.0) {
         return Profile::default();
     }
@@ -59,14 +59,14 @@ pub fn rise(t: f64, duration: f64) -> Profile {
     }
     Profile {
         value_share: u * u * u * (10.0 + u * (-15.0 + u * 6.0)),
-        rate_per_s: u * u * (30.0 + u * (-60.0 + u * 30.0)) / duration,
-        accel_per_s2: u * (60.0 + u * (-180.0 + u * 120.0)) / (duration * duration),
+        rate_per_s: u * u * (30.0 + u * (-60.0 + u * 30.0)) / duration_s,
+        accel_per_s2: u * (60.0 + u * (-180.0 + u * 120.0)) / (duration_s * duration_s),
     }
 }
 
-/// Rises during the first `fade` seconds, is 1, and falls during the last `fade` seconds before `end`.
-pub fn window(t: f64, end: f64, fade: f64) -> Profile {
-    let (up, down) = (rise(t, fade), rise(t - (end - fade), fade));
+/// Rises during the first `fade_s` seconds, is 1, and falls during the last `fade_s` seconds before `end_s`.
+pub fn window(t_s: f64, end_s: f64, fade_s: f64) -> Profile {
+    let (up, down) = (rise(t_s, fade_s), rise(t_s - (end_s - fade_s), fade_s));
     Profile { value_share: up.value_share - down.value_share, rate_per_s: up.rate_per_s - down.rate_per_s, accel_per_s2: up.accel_per_s2 - down.accel_per_s2 }
 }
 

@@ -51,9 +51,9 @@ impl Timeline {
         Self { from: *from, to: *to, approach_s: approach_s.max(SETTLE_S), motion_s }
     }
 
-    /// The same with an approach of at least `seconds`.
-    pub fn with_shortest_approach(self, seconds: f64) -> Self {
-        Self { approach_s: self.approach_s.max(seconds), ..self }
+    /// The same with an approach of at least `shortest_s`.
+    pub fn with_shortest_approach(self, shortest_s: f64) -> Self {
+        Self { approach_s: self.approach_s.max(shortest_s), ..self }
     }
 
     /// Start of the motion itself \[s\].
@@ -66,12 +66,12 @@ impl Timeline {
         self.motion_start() + self.motion_s + SETTLE_S
     }
 
-    /// X, X', X'' at `t`, given the motion as a function of its own time, which is evaluated only within
+    /// X, X', X'' at `t_s`, given the motion as a function of its own time, which is evaluated only within
     /// \[0, duration\].
-    pub fn at(&self, t: f64, motion: impl FnOnce(f64) -> TaskState) -> TaskState {
-        let motion_time = t - self.motion_start();
+    pub fn at(&self, t_s: f64, motion: impl FnOnce(f64) -> TaskState) -> TaskState {
+        let motion_time = t_s - self.motion_start();
         if motion_time < 0.0 {
-            return straight_move(&self.from, &self.to, &rise(t - SETTLE_S, self.approach_s));
+            return straight_move(&self.from, &self.to, &rise(t_s - SETTLE_S, self.approach_s));
         }
         if motion_time <= self.motion_s {
             return motion(motion_time);

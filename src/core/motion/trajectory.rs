@@ -16,7 +16,7 @@ pub struct Knot {
     pub state: TaskState,
 }
 
-/// The state at `t`, clamped to the knots' range; `None` without knots. Their times increase strictly.
+/// The state at `t_s`, clamped to the knots' range; `None` without knots. Their times increase strictly.
 ///
 /// ```
 /// use hexad_core::{model::task::TaskState, motion::trajectory::{Knot, interpolate}};
@@ -26,14 +26,14 @@ pub struct Knot {
 /// let middle = interpolate(&knots, 1.0).unwrap();
 /// assert!((middle.x[5] - 1.1).abs() < 1e-15 && (middle.xd[5] - 0.2 * 1.875 / 2.0).abs() < 1e-15);
 /// ```
-pub fn interpolate(knots: &[Knot], t: f64) -> Option<TaskState> {
-    let after = knots.partition_point(|knot| knot.t_s <= t);
+pub fn interpolate(knots: &[Knot], t_s: f64) -> Option<TaskState> {
+    let after = knots.partition_point(|knot| knot.t_s <= t_s);
     let Some(b) = knots.get(after) else { return knots.last().map(|knot| knot.state) };
     let Some(a) = after.checked_sub(1).and_then(|before| knots.get(before)) else { return Some(b.state) };
-    Some(quintic(&a.state, &b.state, t - a.t_s, b.t_s - a.t_s))
+    Some(quintic(&a.state, &b.state, t_s - a.t_s, b.t_s - a.t_s))
 }
 
-/// The quintic from `a` to `b` over `h` seconds, at `t`.
+/// The quintic from `a` to `b` over `h` seconds, at `t_s`.
 fn quintic(a: &TaskState, b: &TaskState, t: f64, h: f64) -> TaskState {
     // c0 + c1 t + c2 t^2 as at a; c3, c4, c5 make up the difference at b, in units of u = t / h.
     let missing = b.x - a.after(h).x;

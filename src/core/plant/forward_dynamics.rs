@@ -57,8 +57,8 @@ impl ForwardDynamics {
     }
 
     /// Acceleration under six actuator forces \[N\]; `None` if M is not positive definite (a pose that is not one).
-    pub fn acceleration(&self, pose: &Pose, twist: &Twist, force: &[f64; LEGS]) -> Option<Acceleration> {
-        self.acceleration_under(pose, twist, force, &Wrench::default())
+    pub fn acceleration(&self, pose: &Pose, twist: &Twist, force_n: &[f64; LEGS]) -> Option<Acceleration> {
+        self.acceleration_under(pose, twist, force_n, &Wrench::default())
     }
 
     /// Acceleration under six actuator forces and an `external` wrench on the platform.
@@ -66,12 +66,12 @@ impl ForwardDynamics {
         &self,
         pose: &Pose,
         twist: &Twist,
-        force: &[f64; LEGS],
+        force_n: &[f64; LEGS],
         external: &Wrench,
     ) -> Option<Acceleration> {
         let coasting = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::default() };
         let load = self.model.load_of::<Exact>(&coasting);
-        let unbalanced = load.leg_wrenches * Vector6::from(*force) - load.total() + external.vector();
+        let unbalanced = load.leg_wrenches * Vector6::from(*force_n) - load.total() + external.vector();
         let mass: Cholesky<f64, U6> = Cholesky::new(self.mass_matrix(pose))?;
         Some(Acceleration::from_vector(&mass.solve(&unbalanced)))
     }

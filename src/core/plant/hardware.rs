@@ -23,15 +23,15 @@ impl Hardware {
     /// At rest at home, brakes closed; see [`Simulator::imperfect`].
     pub fn new(
         machine: &Machine,
-        deceleration: f64,
-        max_step: f64,
-        tolerance: f64,
+        deceleration_m_s2: f64,
+        max_step_s: f64,
+        tolerance_m: f64,
         wanted: &Imperfections,
     ) -> Self {
         let mut random = Random::new(wanted.seed);
         let built = wanted.build.built(machine, &mut random);
         Self {
-            simulator: Simulator::imperfect(&built, deceleration, max_step, tolerance, wanted),
+            simulator: Simulator::imperfect(&built, deceleration_m_s2, max_step_s, tolerance_m, wanted),
             drive: wanted.drive,
             sensor: wanted.sensor,
             delay: DeadTime::new(wanted.drive.dead_time_ns),
@@ -54,8 +54,8 @@ impl Hardware {
     }
 
     /// Legs slip through their closed brakes; see [`Simulator::slip`].
-    pub fn slip(&mut self, duration_ns: u64, rates: &[f64; LEGS]) {
-        self.simulator.slip(duration_ns as f64 * 1e-9, rates);
+    pub fn slip(&mut self, duration_ns: u64, rates_m_s: &[f64; LEGS]) {
+        self.simulator.slip(duration_ns as f64 * 1e-9, rates_m_s);
     }
 
     /// Lengths \[m\] and rates \[m/s\] as the sensors measure them now. Each reading draws its own noise.

@@ -50,7 +50,7 @@ pub struct DriveErrors {
     pub dead_time_ns: u64,
 }
 
-/// Friction of a leg against the rate v: `viscous v + (coulomb + stiction exp(-(v / stribeck_speed)^2)) sign(v)`.
+/// Friction of a leg against the rate v: `viscous_n_s_m v + (coulomb_n + stiction_n exp(-(v / stribeck_speed_m_s)^2)) sign(v)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// \[N s/m\]
@@ -111,11 +111,11 @@ impl Friction {
     /// Stribeck speed of a usual drive with greased bearings \[m/s\].
     pub const STRIBECK_SPEED_M_S: f64 = 0.01;
 
-    /// The force against `rate`. Its sign is proportional below the speed `smoothing`.
-    pub fn force(&self, rate: f64, smoothing: f64) -> f64 {
-        let sign = (rate / smoothing).clamp(-1.0, 1.0);
-        let share = rate / self.stribeck_speed_m_s;
-        self.viscous_n_s_m * rate + (self.coulomb_n + self.stiction_n * (-share * share).exp()) * sign
+    /// The force against `rate_m_s`. Its sign is proportional below the speed `smoothing_m_s`.
+    pub fn force(&self, rate_m_s: f64, smoothing_m_s: f64) -> f64 {
+        let sign = (rate_m_s / smoothing_m_s).clamp(-1.0, 1.0);
+        let share = rate_m_s / self.stribeck_speed_m_s;
+        self.viscous_n_s_m * rate_m_s + (self.coulomb_n + self.stiction_n * (-share * share).exp()) * sign
     }
 
     /// Coulomb friction and stiction together \[N\].
@@ -130,24 +130,24 @@ impl Friction {
 }
 
 impl ElasticLeg {
-    /// Force \[N\] that pushes drive and rod apart when the drive is `pressed` beyond the leg's length \[m\], at
+    /// Force \[N\] that pushes drive and rod apart when the drive is `pressed_m` beyond the leg's length \[m\], at
     /// this rate \[m/s\]. None within the play.
-    pub fn force(&self, pressed: f64, rate: f64) -> f64 {
+    pub fn force(&self, pressed_m: f64, rate_m_s: f64) -> f64 {
         let half = 0.5 * self.backlash_m;
-        let beyond = pressed - pressed.clamp(-half, half);
-        if beyond == 0.0 { 0.0 } else { self.stiffness_n_per_m * beyond + self.damping_n_s_m * rate }
+        let beyond = pressed_m - pressed_m.clamp(-half, half);
+        if beyond == 0.0 { 0.0 } else { self.stiffness_n_per_m * beyond + self.damping_n_s_m * rate_m_s }
     }
 
     /// How far a drive is pressed beyond the leg's length at rest under this force \[m\].
-    pub fn deflection(&self, force: f64) -> f64 {
-        force / self.stiffness_n_per_m + if force == 0.0 { 0.0 } else { (0.5 * self.backlash_m).copysign(force) }
+    pub fn deflection(&self, force_n: f64) -> f64 {
+        force_n / self.stiffness_n_per_m + if force_n == 0.0 { 0.0 } else { (0.5 * self.backlash_m).copysign(force_n) }
     }
 }
 
 impl ExternalWrench {
-    /// The wrench `time` after the start of the plant.
-    pub fn at(&self, time: f64) -> Wrench {
-        let phase = core::f64::consts::TAU * self.frequency_hz * time;
+    /// The wrench `time_s` after the start of the plant.
+    pub fn at(&self, time_s: f64) -> Wrench {
+        let phase = core::f64::consts::TAU * self.frequency_hz * time_s;
         let Wrench { torque, force } = self.wrench;
         Wrench { torque: torque * phase.cos(), force: force * phase.cos() }
     }

@@ -54,11 +54,11 @@ struct Slope {
     drives: DriveStates,
 }
 
-/// The state `step` seconds later; `None` where the dynamics are not defined. `accelerations` takes a state and
+/// The state `step_s` seconds later; `None` where the dynamics are not defined. `accelerations` takes a state and
 /// its time since the start of the step.
 pub fn integrate(
     start: &PlantState,
-    step: f64,
+    step_s: f64,
     accelerations: impl Fn(&PlantState, f64) -> Option<Accelerations>,
 ) -> Option<PlantState> {
     // The state at `start` displaced by `theta` and `slope` over `dt`, and the slope there.
@@ -77,9 +77,9 @@ pub fn integrate(
     let rest =
         Slope { pose: Twist::default(), twist: Acceleration::default(), drives: DriveStates::default() };
     let k1 = slope_at(&rest, 0.0)?;
-    let k2 = slope_at(&k1, 0.5 * step)?;
-    let k3 = slope_at(&k2, 0.5 * step)?;
-    let k4 = slope_at(&k3, step)?;
+    let k2 = slope_at(&k1, 0.5 * step_s)?;
+    let k3 = slope_at(&k2, 0.5 * step_s)?;
+    let k4 = slope_at(&k3, step_s)?;
     let mean = |f: fn(&Slope) -> Vector3<f64>| (f(&k1) + (f(&k2) + f(&k3)) * 2.0 + f(&k4)) / 6.0;
     let of_drives = |f: fn(&Slope) -> Vector6<f64>| (f(&k1) + (f(&k2) + f(&k3)) * 2.0 + f(&k4)) / 6.0;
     let slope = Slope {
@@ -87,7 +87,7 @@ pub fn integrate(
         twist: Acceleration { angular: mean(|k| k.twist.angular), linear: mean(|k| k.twist.linear) },
         drives: DriveStates { length_m: of_drives(|k| k.drives.length_m), rate_m_s: of_drives(|k| k.drives.rate_m_s) },
     };
-    Some(advanced(start, &slope, step))
+    Some(advanced(start, &slope, step_s))
 }
 
 fn advanced(start: &PlantState, slope: &Slope, dt: f64) -> PlantState {

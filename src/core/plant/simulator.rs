@@ -76,26 +76,26 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// The machine as configured: at rest at home, brakes closed. `deceleration` of the brakes in m/s^2,
-    /// `max_step` of the integrator in s.
+    /// The machine as configured: at rest at home, brakes closed. `deceleration_m_s2` of the brakes in m/s^2,
+    /// `max_step_s` of the integrator in s.
     ///
     /// Coulomb friction acts within `smoothing / (coulomb / mass)`; where that is too fast for the step,
     /// the plant's smoothing speed is widened just enough for a stable integration.
-    pub fn new(machine: &Machine, deceleration: f64, max_step: f64) -> Self {
+    pub fn new(machine: &Machine, deceleration_m_s2: f64, max_step_s: f64) -> Self {
         // Nothing is imperfect, so no tolerance decides anything.
-        Self::imperfect(machine, deceleration, max_step, f64::INFINITY, &Imperfections::default())
+        Self::imperfect(machine, deceleration_m_s2, max_step_s, f64::INFINITY, &Imperfections::default())
     }
 
-    /// The same with imperfect drives and elastic legs, positions exact to `tolerance` \[m\]. The other imperfections are
+    /// The same with imperfect drives and elastic legs, positions exact to `tolerance_m` \[m\]. The other imperfections are
     /// applied by [`super::hardware`].
     pub fn imperfect(
         machine: &Machine,
-        deceleration: f64,
-        max_step: f64,
-        tolerance: f64,
+        deceleration_m_s2: f64,
+        max_step_s: f64,
+        tolerance_m: f64,
         wanted: &Imperfections,
     ) -> Self {
-        let terms = PlantTerms::choose(machine, wanted, max_step, tolerance);
+        let terms = PlantTerms::choose(machine, wanted, max_step_s, tolerance_m);
         let machine = terms.machine(machine);
         let home = TaskState::at_rest(machine.home).motion();
         let mut length = Vector6::from(leg_lengths(&machine, &home.pose));
@@ -110,7 +110,7 @@ impl Simulator {
                 drives: DriveStates { length_m: length, rate_m_s: Vector6::zeros() },
             },
             brakes: Brakes::Closed,
-            deceleration,
+            deceleration: deceleration_m_s2,
             push: [0.0; LEGS],
             time: 0.0,
         }
@@ -153,9 +153,9 @@ impl Simulator {
         }
     }
 
-    /// Advances by `duration` seconds under constant forces, or without any.
-    pub fn advance(&mut self, duration: f64, force: Option<&[f64; LEGS]>) {
-        if !(duration > 0.0) {
+    /// Advances by `duration_s` seconds under constant forces, or without any.
+    pub fn advance(&mut self, duration_s: f64, force: Option<&[f64; LEGS]>) {
+        if !(duration_s > 0.0) {
             return;
         }
         match (self.brakes, force) {
@@ -164,8 +164,8 @@ impl Simulator {
             (Brakes::Open, None) => self.close_brakes(),
             _ => {}
         }
-        let steps = (duration / self.terms.step_s).ceil().clamp(1.0, f64::from(u32::MAX)) as u32;
-        let step = duration / f64::from(steps);
+        let steps = (duration_s / self.terms.step_s).ceil().clamp(1.0, f64::from(u32::MAX)) as u32;
+        let step = duration_s / f64::from(steps);
         for _ in 0..steps {
             match (self.brakes, force) {
                 (Brakes::Open, Some(force)) => self.drive(force, step),
@@ -178,15 +178,15 @@ impl Simulator {
         }
     }
 
-    /// Legs slip through their closed brakes at these rates \[m/s\] for `duration` seconds, as worn brakes let them.
-    pub fn slip(&mut self, duration: f64, rates: &[f64; LEGS]) {
+    /// Legs slip through their closed brakes at these rates \[m/s\] for `duration_s` seconds, as worn brakes let them.
+    pub fn slip(&mut self, duration_s: f64, rates_m_s: &[f64; LEGS]) {
         if self.brakes != Brakes::Closed {
             return;
         }
         let before = self.state().pose;
-        let twist = twist_from_rates(self.machine(), &before, rates).unwrap_or_default();
+        let twist = twist_from_rates(self.machine(), &before, rates_m_s).unwrap_or_default();
         let pose =
-            before.displaced(&Twist { angular: twist.angular * duration, linear: twist.linear * duration });
+            before.displaced(&Twist { angular: twist.angular * duration_s, linear: twist.linear * duration_s });
         self.carry_drives(BodyState { pose, twist: Twist::default() });
     }
 

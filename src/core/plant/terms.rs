@@ -52,9 +52,9 @@ pub struct PlantTerms {
 }
 
 impl PlantTerms {
-    /// Chooses terms and step, at most `longest_step`, for positions exact to `tolerance` \[m\]. A leg is elastic
+    /// Chooses terms and step, at most `longest_step_s`, for positions exact to `tolerance_m` \[m\]. A leg is elastic
     /// only where its drive has mass.
-    pub fn choose(machine: &Machine, wanted: &Imperfections, longest_step: f64, tolerance: f64) -> Self {
+    pub fn choose(machine: &Machine, wanted: &Imperfections, longest_step_s: f64, tolerance_m: f64) -> Self {
         let actuator = &machine.actuator;
         let least_mass = |machine: &Machine| {
             ForwardDynamics::new(machine).smallest_leg_mass(&machine.home_pose()).unwrap_or(f64::NAN)
@@ -64,13 +64,13 @@ impl PlantTerms {
         let depends = wanted.drive.bandwidth_hz.is_some() || wanted.leg.is_some() || wanted.friction.any();
         let leg_mass = if depends || dry > 0.0 { least_mass(machine) } else { f64::NAN };
         let drive_mass = actuator.reflected_mass_kg;
-        let mut step = longest_step;
+        let mut step = longest_step_s;
         let mut limit = |rate: f64, effect: f64, divisor: f64| {
-            step = step.min((divisor * tolerance / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
+            step = step.min((divisor * tolerance_m / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
         };
 
         let deflection = |spring: &ElasticLeg| actuator.max_force_n / spring.stiffness_n_per_m + 0.5 * spring.backlash_m;
-        let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance);
+        let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance_m);
         let mut friction = [wanted.friction; LEGS];
         let mut moved = leg_mass;
         if let Some(spring) = spring {
@@ -86,7 +86,7 @@ impl PlantTerms {
         }
         let way = |rate: f64| actuator.max_force_n / (moved * rate * rate);
         let lag_rate = wanted.drive.bandwidth_hz.map(|hertz| core::f64::consts::TAU * hertz);
-        let lag = lag_rate.filter(|rate| way(*rate) > tolerance);
+        let lag = lag_rate.filter(|rate| way(*rate) > tolerance_m);
         if let Some(rate) = lag {
             limit(rate, way(rate), 2880.0);
         }
@@ -113,32 +113,32 @@ impl PlantTerms {
         if self.elastic.is_some() { without_drives(&simulated) } else { simulated }
     }
 
-    /// Forces of the drives \[N\], as they know them, a `time` after `command`, from the forces `before` it.
-    pub fn push(&self, before: &[f64; LEGS], command: &[f64; LEGS], time: f64) -> [f64; LEGS] {
-        let Some(rate) = self.lag_per_s else { return *command };
-        let share = (-rate * time).exp();
-        let mut push = *command;
-        for (push, before) in push.iter_mut().zip(before) {
+    /// Forces of the drives \[N\], as they know them, a `time_s` after `command_n`, from the forces `before_n` it.
+    pub fn push(&self, before_n: &[f64; LEGS], command_n: &[f64; LEGS], time_s: f64) -> [f64; LEGS] {
+        let Some(rate) = self.lag_per_s else { return *command_n };
+        let share = (-rate * time_s).exp();
+        let mut push = *command_n;
+        for (push, before) in push.iter_mut().zip(before_n) {
             *push += (before - *push) * share;
         }
         push
     }
 
-    /// Accelerations of a state under the forces `push` of the drives, `time` after the start of the plant.
+    /// Accelerations of a state under the forces `push_n` of the drives, `time_s` after the start of the plant.
     pub fn accelerations(
         &self,
         dynamics: &ForwardDynamics,
         state: &PlantState,
-        push: &[f64; LEGS],
-        time: f64,
+        push_n: &[f64; LEGS],
+        time_s: f64,
     ) -> Option<Accelerations> {
         let PlantState { platform, drives } = state;
         let actuator = &dynamics.machine().actuator;
-        let mut force = *push;
+        let mut force = *push_n;
         let mut drives_accelerate = Vector6::zeros();
         if let Some((spring, drive_mass)) = self.elastic {
             let LegMotion { length_m: length, rate_m_s: rate, .. } = legs(dynamics.machine(), state);
-            force = Transmission::new(actuator, drives.rate_m_s.as_ref()).leg_forces(push);
+            force = Transmission::new(actuator, drives.rate_m_s.as_ref()).leg_forces(push_n);
             let on_drives = drives.length_m.iter().zip(&drives.rate_m_s).zip(&mut drives_accelerate);
             let on_rods = force.iter_mut().zip(&self.friction).zip(length.iter().zip(&rate));
             for (((force, friction), (length, rate)), ((drive, drive_rate), accelerates)) in
@@ -150,12 +150,12 @@ impl PlantTerms {
             }
         } else if actuator.transmits_otherwise() || self.friction.iter().any(Friction::any) {
             let rates = legs(dynamics.machine(), state).rate_m_s;
-            force = Transmission::new(actuator, &rates).leg_forces(push);
+            force = Transmission::new(actuator, &rates).leg_forces(push_n);
             for ((force, friction), rate) in force.iter_mut().zip(&self.friction).zip(rates) {
                 *force -= friction.force(rate, self.smoothing);
             }
         }
-        let wrench = self.external.at(time);
+        let wrench = self.external.at(time_s);
         let platform = dynamics.acceleration_under(&platform.pose, &platform.twist, &force, &wrench)?;
         Some(Accelerations { platform, drives_m_s2: drives_accelerate })
     }

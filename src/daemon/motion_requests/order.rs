@@ -14,7 +14,7 @@ use hexad_machine::config::frames::FrameKind;
 /// Largest coordinate of a request \[m\], \[rad\]: beyond every machine.
 const MAX_COORDINATE: f64 = 1000.0;
 
-/// Bounds of `speed` and of `tolerance_m`.
+/// Bounds of `speed_share` and of `tolerance_m`.
 const SPEED: [f64; 2] = [0.01, 1.0];
 const TOLERANCE_M: [f64; 2] = [1e-9, 0.1];
 

@@ -18,7 +18,7 @@ const SEARCH_TURN_RAD: f64 = FRAC_PI_2;
 /// Distance (radian, or radius) within which another mode may be the platform's true pose, also across a singular pose.
 const CONFUSABLE_DISTANCE: f64 = 0.5;
 
-/// The poses with these lengths \[m\] on the side of home that are turned from it by at most `max_rotation` of the machine.
+/// The poses with these lengths \[m\] on the side of home that are turned from it by at most `max_rotation_rad` of the machine.
 ///
 /// ```
 /// use hexad_machine::analysis::assembly_modes::permitted_modes;

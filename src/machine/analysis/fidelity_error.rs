@@ -91,7 +91,7 @@ impl ErrorStatistics {
         }
     }
 
-    /// Mean of a fidelity's errors \[N\]; like `errors`, NaN without a sample.
+    /// Mean of a fidelity's errors \[N\]; like `errors_n`, NaN without a sample.
     pub fn mean(&self, errors: &ErrorSums) -> f64 {
         errors.sum / self.values()
     }

@@ -11,7 +11,7 @@ use hexad_core::model::task::{TaskState, task_coordinates};
 /// Shape of a family of growing regions around home, and the meaning of its six parameters, angular parameters first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RegionShape {
-    /// Positions within a radius \[m\], the size; any turn from home's orientation about any axis up to `turn` \[rad\], at
+    /// Positions within a radius \[m\], the size; any turn from home's orientation about any axis up to `turn_rad` \[rad\], at
     /// most a quarter. The angles turn home's platform.
     Ball {
         /// \[rad\]

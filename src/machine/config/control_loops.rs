@@ -58,7 +58,7 @@ fn loops_of(
 }
 
 /// Masses of the platform, as ratios of the modelled mass, for which the loop must be stable at the longest age of its
-/// measurements. The range is narrower than [`STABLE_MASSES`]: so slow a driver and so wrong a model are both rare.
+/// measurements. The range is narrower than [`STABLE_MASS_RATIOS`]: so slow a driver and so wrong a model are both rare.
 const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 
 /// Largest constant age of the measurements with which all loops are stable and the estimator still has the

@@ -177,8 +177,8 @@ impl ErrorTracker {
 
     /// Records the forces at the legs and the feedback acceleration that are sent, after all limits, and the instant
     /// from which they act.
-    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &FeedbackAcceleration, force: &[f64; LEGS]) {
-        (self.sent, self.sent_acceleration) = (*force, *acceleration);
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &FeedbackAcceleration, force_n: &[f64; LEGS]) {
+        (self.sent, self.sent_acceleration) = (*force_n, *acceleration);
         self.estimator.record_sent(begin_ns, acceleration);
     }
 }

@@ -97,13 +97,13 @@ impl Law {
     pub(in crate::control) fn max_leg_acceleration_without_feedforward(
         &self,
         limits: &Limits,
-        arm: f64,
-        disturbance: &Vector6<f64>,
+        arm_m: f64,
+        disturbance_acceleration: &Vector6<f64>,
     ) -> f64 {
         if self.mode.includes_inertia() {
             return 0.0;
         }
-        limits.position.acceleration + arm * limits.orientation.acceleration + disturbance.amax()
+        limits.position.acceleration + arm_m * limits.orientation.acceleration + disturbance_acceleration.amax()
     }
 
     /// Kp and Kd of the six errors.

@@ -38,20 +38,20 @@ impl ForceLimiter {
     pub fn limit(
         &mut self,
         cycle: &Cycle<'_>,
-        wanted: &[f64; LEGS],
+        wanted_n: &[f64; LEGS],
         (motion, transmission): (&Motion, &Transmission),
         limited: &mut LimitedForces,
     ) -> Result<(), Diagnostic> {
         let Cycle { constants, state, .. } = *cycle;
-        let possible = limit_magnitude(constants, wanted, (motion, transmission))?;
+        let possible = limit_magnitude(constants, wanted_n, (motion, transmission))?;
         let command = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
         limited.command_n = command;
         limited.active_limits = LimitSet::default()
-            .with(Limit::Force, possible != *wanted)
+            .with(Limit::Force, possible != *wanted_n)
             .with(Limit::ForceRate, command != possible);
-        (self.last, self.is_limited) = (command, command != *wanted);
+        (self.last, self.is_limited) = (command, command != *wanted_n);
         if self.is_limited {
-            limited.wrench_error = wrench_error(constants, (motion, transmission), &command, wanted);
+            limited.wrench_error = wrench_error(constants, (motion, transmission), &command, wanted_n);
         }
         Ok(())
     }

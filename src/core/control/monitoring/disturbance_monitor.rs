@@ -112,8 +112,8 @@ pub struct DisturbanceBounds {
 }
 
 impl DisturbanceBounds {
-    /// Bounds of a machine. `arm` is the radius that weights angles \[m\].
-    pub fn new(machine: &Machine, parameters: &Parameters, input_matrix: &InputMatrix, arm: f64) -> Self {
+    /// Bounds of a machine. `arm_m` is the radius that weights angles \[m\].
+    pub fn new(machine: &Machine, parameters: &Parameters, input_matrix: &InputMatrix, arm_m: f64) -> Self {
         let Parameters { law, payload_change_kg, disturbance_step_m_s2: disturbance_step, .. } = parameters;
         let ReadingErrors { deviation_m: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
@@ -126,7 +126,7 @@ impl DisturbanceBounds {
         let friction = FrictionEffects {
             force_n: machine.actuator.friction_uncertainty_n,
             payload_kg_per_n: by_force.tr_mul(&payload_by_disturbance).into(),
-            acceleration_m_s2_per_n: core::array::from_fn(|leg| weighted(&by_force.column(leg).into(), arm).norm()),
+            acceleration_m_s2_per_n: core::array::from_fn(|leg| weighted(&by_force.column(leg).into(), arm_m).norm()),
             by_force,
             force_by_disturbance: by_force.try_inverse().unwrap_or_default(),
         };
@@ -142,7 +142,7 @@ impl DisturbanceBounds {
         let swing = (MIN_SWING_PEAK_TO_PEAK_M * softness * softness).min(MAX_SWING_M);
         let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
-        let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm;
+        let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm_m;
         Self {
             payload_by_disturbance,
             payload_by_norm: by_angles.hypot(payload_by_disturbance.fixed_rows::<3>(3).norm()),
@@ -162,7 +162,7 @@ impl DisturbanceBounds {
             swing_by_acceleration: shaking / softest,
             swing_by_friction: MAX_SWING_BY_FRICTION / softest,
             max_reversal_interval_s: core::f64::consts::TAU / softest.sqrt(),
-            arm_squared: arm * arm,
+            arm_squared: arm_m * arm_m,
             friction,
         }
     }
@@ -210,7 +210,7 @@ impl DisturbanceMonitor {
         self.removed_acceleration = self.removed_acceleration.max(bounds.norm_squared(removed).sqrt());
     }
 
-    /// Checks the estimate after a measurement, `dt` seconds after the previous one. `sudden` is the
+    /// Checks the estimate after a measurement, `dt_s` seconds after the previous one. `sudden` is the
     /// disturbance without its mean; 0 if the force of one leg explains it.
     pub fn check(
         &mut self,
@@ -218,17 +218,17 @@ impl DisturbanceMonitor {
         estimate: &ErrorEstimate,
         reference: &Motion,
         (sudden, friction): (&Vector6<f64>, &UnstatedFriction),
-        dt: f64,
+        dt_s: f64,
     ) -> Result<(), Diagnostic> {
-        self.since_start_s += dt;
-        self.removed_acceleration *= 1.0 - (dt / CUT_FORCE_DECAY_TIME_CONSTANT_S).min(1.0);
+        self.since_start_s += dt_s;
+        self.removed_acceleration *= 1.0 - (dt_s / CUT_FORCE_DECAY_TIME_CONSTANT_S).min(1.0);
         let by_friction = friction.payload_changes(&bounds.friction);
         let payload =
-            self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, by_friction, dt);
-        let impact = self.check_impact(bounds, sudden, friction, dt);
+            self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, by_friction, dt_s);
+        let impact = self.check_impact(bounds, sudden, friction, dt_s);
         let by_friction = bounds.swing_by_friction * friction.swing_acceleration(&bounds.friction);
         let reference = reference.acceleration.vector();
-        let oscillation = self.oscillation.check(bounds, &estimate.value, &reference, by_friction, dt);
+        let oscillation = self.oscillation.check(bounds, &estimate.value, &reference, by_friction, dt_s);
         // Control begins with an unknown payload, and the error rings.
         let oscillation = if self.since_start_s < START_S { Ok(()) } else { oscillation };
         oscillation?;

@@ -53,21 +53,21 @@ pub(in crate::control) struct DriveResponse {
 }
 
 impl DriveResponse {
-    /// Checks the disturbance after a measurement, `dt` seconds after the previous one.
+    /// Checks the disturbance after a measurement, `dt_s` seconds after the previous one.
     pub fn check(
         &mut self,
         constants: &Constants,
-        disturbance: &Vector6<f64>,
-        sent: &[f64; LEGS],
+        disturbance_acceleration: &Vector6<f64>,
+        sent_n: &[f64; LEGS],
         pose: &Pose,
-        dt: f64,
+        dt_s: f64,
     ) -> Result<(), Diagnostic> {
-        let sudden = disturbance - self.usual_disturbance;
-        self.since_start_s += dt;
+        let sudden = disturbance_acceleration - self.usual_disturbance;
+        self.since_start_s += dt_s;
         let is_starting = self.since_start_s < START_S;
-        let share = if is_starting { 1.0 } else { (dt / USUAL_DISTURBANCE_S).min(1.0) };
+        let share = if is_starting { 1.0 } else { (dt_s / USUAL_DISTURBANCE_S).min(1.0) };
         self.usual_disturbance += sudden * share;
-        let sent = Vector6::from(*sent);
+        let sent = Vector6::from(*sent_n);
         self.usual_force += (sent - self.usual_force) * share;
         let arm = constants.angle_weighting_radius_m();
         self.sudden_acceleration = if is_starting { Vector6::zeros() } else { sudden };
@@ -76,7 +76,7 @@ impl DriveResponse {
             self.missing_s = 0.0;
             return Ok(());
         }
-        self.check_legs(constants, &sudden, &sent, pose, dt)
+        self.check_legs(constants, &sudden, &sent, pose, dt_s)
     }
 
     // Rarely called, hence out of line: the cycle stays short.

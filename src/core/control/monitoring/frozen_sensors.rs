@@ -77,10 +77,10 @@ pub struct FrozenLegBounds {
 
 impl FrozenLegBounds {
     /// Bounds of a loop with the stiffness Kp \[1/s^2\].
-    pub fn new(stiffness: f64, actuator: &Actuator, period_s: f64) -> Self {
+    pub fn new(kp_per_s2: f64, actuator: &Actuator, period_s: f64) -> Self {
         let friction = FRICTION_REVERSAL * actuator.friction_uncertainty_n;
         Self {
-            motion_m: motion_bound(stiffness),
+            motion_m: motion_bound(kp_per_s2),
             force_n: friction.max(STICTION_RATIO * actuator.max_force_n),
             friction_n: friction,
             long: (LONG_S / period_s) as u32,
@@ -127,14 +127,14 @@ impl FrozenSensors {
     /// it is called only if a reading has repeated.
     pub fn check(
         &mut self,
-        length: &[f64; LEGS],
+        length_m: &[f64; LEGS],
         errors: &ReadingErrors,
         one_leg: &FrozenLegBounds,
         legs: impl FnOnce() -> [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
         let mut is_any_equal = false;
         let memory = self.last.iter_mut().zip(&mut self.equal_readings).zip(&mut self.least_change);
-        for (((last, equal), least_change), length) in memory.zip(length) {
+        for (((last, equal), least_change), length) in memory.zip(length_m) {
             // To the last bit, because a frozen sensor repeats its reading exactly.
             let is_equal = last.to_bits() == length.to_bits();
             *equal = if is_equal { equal.saturating_add(1) } else { 0 };

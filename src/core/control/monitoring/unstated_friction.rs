@@ -56,15 +56,15 @@ pub(in crate::control) struct UnstatedFriction {
 }
 
 impl UnstatedFriction {
-    /// Follows the rates of the reference's legs, `dt` seconds after the last.
-    pub fn update(&mut self, rates: &[f64; LEGS], dt: f64) {
-        let is_standing = rates.iter().all(|rate| rate.abs() < STANDING_M_S);
-        let legs = self.direction.iter_mut().zip(rates);
+    /// Follows the rates of the reference's legs, `dt_s` seconds after the last.
+    pub fn update(&mut self, rates_m_s: &[f64; LEGS], dt_s: f64) {
+        let is_standing = rates_m_s.iter().all(|rate| rate.abs() < STANDING_M_S);
+        let legs = self.direction.iter_mut().zip(rates_m_s);
         for ((direction, rate), (sudden, unusual)) in legs.zip(self.sudden.iter_mut().zip(&mut self.unusual))
         {
             let now = if rate.abs() < STICKING_M_S { 0 } else { rate.signum() as i8 };
-            *sudden *= 1.0 - (dt / USUAL_DISTURBANCE_S).min(1.0);
-            *unusual *= 1.0 - (dt / USUAL_PAYLOAD_S).min(1.0);
+            *sudden *= 1.0 - (dt_s / USUAL_DISTURBANCE_S).min(1.0);
+            *unusual *= 1.0 - (dt_s / USUAL_PAYLOAD_S).min(1.0);
             if now != *direction || now == 0 && !is_standing {
                 (*direction, *sudden, *unusual) = (now, REVERSAL, REVERSAL);
             }
@@ -93,13 +93,13 @@ impl UnstatedFriction {
     /// Part of a sudden disturbance that friction does not explain.
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
-    pub fn unexplained(&self, effects: &FrictionEffects, sudden: &Vector6<f64>) -> Vector6<f64> {
-        let mut explained = effects.force_by_disturbance * sudden;
+    pub fn unexplained(&self, effects: &FrictionEffects, sudden_acceleration: &Vector6<f64>) -> Vector6<f64> {
+        let mut explained = effects.force_by_disturbance * sudden_acceleration;
         for (force, [low, high]) in explained.iter_mut().zip(self.forces(effects.force_n, &self.sudden)) {
             // Not `clamp`, which may panic.
             *force = force.max(low).min(high);
         }
-        sudden - effects.by_force * explained
+        sudden_acceleration - effects.by_force * explained
     }
 
     /// Acceleration with which friction may swing the platform \[m/s^2\].

@@ -39,9 +39,9 @@ impl History {
         self.total_recorded = 0;
     }
 
-    /// Records the segment from `motion` at `begin_ns` to the acceleration `next`, `dt` seconds later.
-    pub fn record(&mut self, begin_ns: u64, motion: &Motion, next: &Acceleration, dt: f64) {
-        let jerk = Acceleration::from_vector(&((next.vector() - motion.acceleration.vector()) / dt));
+    /// Records the segment from `motion` at `begin_ns` to the acceleration `next`, `dt_s` seconds later.
+    pub fn record(&mut self, begin_ns: u64, motion: &Motion, next: &Acceleration, dt_s: f64) {
+        let jerk = Acceleration::from_vector(&((next.vector() - motion.acceleration.vector()) / dt_s));
         if let Some(slot) = self.segments.get_mut(self.total_recorded % SEGMENT_COUNT) {
             *slot = Some(Segment { begin_ns, motion: *motion, jerk });
         }

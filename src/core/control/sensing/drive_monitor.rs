@@ -70,8 +70,8 @@ impl DriveMonitor {
     }
 
     /// Records the commands that are sent in this cycle.
-    pub fn record_sent(&mut self, force: &[f64; LEGS]) {
-        self.sent = *force;
+    pub fn record_sent(&mut self, force_n: &[f64; LEGS]) {
+        self.sent = *force_n;
     }
 
     fn check_ready(&mut self, cycle: &Cycle<'_>, unready: Option<usize>) -> Result<(), Diagnostic> {

@@ -105,20 +105,20 @@ pub(in crate::control) fn check_time_stamp(
 pub(in crate::control) fn check_stroke_with_tolerance(
     actuator: &Actuator,
     code: DiagnosticCode,
-    length: &[f64; LEGS],
+    length_m: &[f64; LEGS],
 ) -> Result<(), Diagnostic> {
-    check_stroke(actuator, STROKE_TOLERANCE_RATIO * actuator.stroke(), code, length)
+    check_stroke(actuator, STROKE_TOLERANCE_RATIO * actuator.stroke(), code, length_m)
 }
 
-/// Whether all lengths are within the stroke, widened by `tolerance` \[m\].
+/// Whether all lengths are within the stroke, widened by `tolerance_m` \[m\].
 pub(in crate::control) fn check_stroke(
     actuator: &Actuator,
-    tolerance: f64,
+    tolerance_m: f64,
     code: DiagnosticCode,
-    length: &[f64; LEGS],
+    length_m: &[f64; LEGS],
 ) -> Result<(), Diagnostic> {
-    let (shortest, longest) = (actuator.min_length_m - tolerance, actuator.max_length_m + tolerance);
-    for (leg, length) in length.iter().enumerate() {
+    let (shortest, longest) = (actuator.min_length_m - tolerance_m, actuator.max_length_m + tolerance_m);
+    for (leg, length) in length_m.iter().enumerate() {
         if *length >= shortest && *length <= longest {
             continue;
         }

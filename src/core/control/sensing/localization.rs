@@ -92,7 +92,7 @@ impl Localization {
         &mut self,
         cycle: &Cycle<'_>,
         measurement: &'a Measurement,
-        rate: [f64; LEGS],
+        rate_m_s: [f64; LEGS],
     ) -> Result<Located<'a>, Diagnostic> {
         self.assembly_mode_fault.map_or(Ok(()), Err)?;
         let Cycle { constants, state, .. } = *cycle;
@@ -129,20 +129,20 @@ impl Localization {
             }
         }
         let kinematic_state = self.tracker.kinematic_state();
-        let twist = kinematic_state.twist(machine, &rate).ok_or(DiagnosticCode::SingularPose)?;
+        let twist = kinematic_state.twist(machine, &rate_m_s).ok_or(DiagnosticCode::SingularPose)?;
         let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
         let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
         let pose = *self.tracker.pose();
         Ok(Located {
             measurement,
-            rate_m_s: rate,
+            rate_m_s,
             platform: PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity },
         })
     }
 
     /// Twist of the platform at given leg rates \[m/s\]; `None` at a singular pose.
-    pub fn twist_of(&self, constants: &Constants, rate: &Vector6<f64>) -> Option<Twist> {
-        self.tracker.kinematic_state().twist(constants.machine(), &(*rate).into())
+    pub fn twist_of(&self, constants: &Constants, rate_m_s: &Vector6<f64>) -> Option<Twist> {
+        self.tracker.kinematic_state().twist(constants.machine(), &(*rate_m_s).into())
     }
 
     /// Ends an assembly mode fault: an operator has inspected the platform.
@@ -152,19 +152,19 @@ impl Localization {
         }
     }
 
-    /// Whether the condition of the pose is within `bound`.
-    pub fn check_condition(&self, bound: f64, active: &mut LimitSet) -> Result<(), Diagnostic> {
+    /// Whether the condition of the pose is within `max_condition`.
+    pub fn check_condition(&self, max_condition: f64, active: &mut LimitSet) -> Result<(), Diagnostic> {
         let condition = self.tracker.kinematic_state().sensitivity().condition;
-        if active.check(Limit::Condition, condition / bound) {
+        if active.check(Limit::Condition, condition / max_condition) {
             return Ok(());
         }
-        Err(self.near_singular(bound))
+        Err(self.near_singular(max_condition))
     }
 
-    /// Diagnostic of a pose that is not singular, but whose condition exceeds `bound`.
-    pub fn near_singular(&self, bound: f64) -> Diagnostic {
+    /// Diagnostic of a pose that is not singular, but whose condition exceeds `max_condition`.
+    pub fn near_singular(&self, max_condition: f64) -> Diagnostic {
         let condition = self.tracker.kinematic_state().sensitivity().condition;
-        Diagnostic::new(DiagnosticCode::NearSingular, condition, bound)
+        Diagnostic::new(DiagnosticCode::NearSingular, condition, max_condition)
     }
 
     /// Restarts at home, the only pose whose assembly mode is known.

@@ -75,15 +75,15 @@ impl SetpointMotion {
         self.jerk_s = JERK_INTERVALS * dt + ahead_s;
     }
 
-    /// Motion after `dt` seconds relative to the pose of the setpoint, to first order in the angle covered.
-    pub(in crate::control) fn continued(&self, dt: f64) -> RelativeMotion {
+    /// Motion after `dt_s` seconds relative to the pose of the setpoint, to first order in the angle covered.
+    pub(in crate::control) fn continued(&self, dt_s: f64) -> RelativeMotion {
         let (v, a, j) = (self.motion.twist.vector(), self.motion.acceleration.vector(), &self.jerk);
-        let t = dt.max(0.0).min(self.jerk_s);
-        let rest = dt.max(0.0) - t;
+        let t = dt_s.max(0.0).min(self.jerk_s);
+        let rest = dt_s.max(0.0) - t;
         let by_jerk = t * (t * t / 6.0 + rest * (0.5 * t + 0.5 * rest));
         RelativeMotion {
-            displacement: (v + a * (0.5 * dt)) * dt + j * by_jerk,
-            twist: Twist::from_vector(&(v + a * dt + j * (t * (0.5 * t + rest)))),
+            displacement: (v + a * (0.5 * dt_s)) * dt_s + j * by_jerk,
+            twist: Twist::from_vector(&(v + a * dt_s + j * (t * (0.5 * t + rest)))),
             acceleration: Acceleration::from_vector(&(a + j * t)),
         }
     }

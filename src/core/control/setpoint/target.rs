@@ -87,17 +87,17 @@ impl<'a> Target<'a> {
     pub(in crate::control) fn limits(
         &self,
         limits: &Limits,
-        strength: f64,
+        strength_share: f64,
         present: &Acceleration,
     ) -> Limits {
-        let strong = limits.with_accelerations_scaled(strength);
+        let strong = limits.with_accelerations_scaled(strength_share);
         let Self::Pose { speed_share, .. } = self else { return strong };
         let mut share = limits.scaled(limits.autonomous_scale * speed_share);
         for (share, strong, present) in [
             (&mut share.orientation, &strong.orientation, &present.angular),
             (&mut share.position, &strong.position, &present.linear),
         ] {
-            share.velocity *= strength.sqrt();
+            share.velocity *= strength_share.sqrt();
             share.acceleration = share.acceleration.min(strong.acceleration);
             let notable = NOTABLE_RATIO * share.acceleration;
             if present.norm_squared() > notable * notable {
@@ -109,8 +109,8 @@ impl<'a> Target<'a> {
 }
 
 /// Share of the limits for the speed of a setpoint; all of them if the speed is no share.
-pub fn share(target_speed: f64) -> f64 {
-    if target_speed > 0.0 { target_speed.clamp(MIN_TARGET_SPEED, 1.0) } else { 1.0 }
+pub fn share(target_speed_share: f64) -> f64 {
+    if target_speed_share > 0.0 { target_speed_share.clamp(MIN_TARGET_SPEED, 1.0) } else { 1.0 }
 }
 
 /// Motion of a platform that stands at a pose.

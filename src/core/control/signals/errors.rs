@@ -43,11 +43,11 @@ pub struct ErrorCoordinates {
 
 impl ErrorCoordinates {
     /// Error of leg lengths and rates.
-    pub fn of_legs(machine: &Machine, desired: &Motion, length: &[f64; LEGS], rate: &[f64; LEGS]) -> Self {
+    pub fn of_legs(machine: &Machine, desired: &Motion, length_m: &[f64; LEGS], rate_m_s: &[f64; LEGS]) -> Self {
         let (desired, desired_rate) = leg_lengths_and_rates(machine, &desired.pose, &desired.twist);
         Self {
-            value: Vector6::from(desired) - Vector6::from(*length),
-            rate: Vector6::from(desired_rate) - Vector6::from(*rate),
+            value: Vector6::from(desired) - Vector6::from(*length_m),
+            rate: Vector6::from(desired_rate) - Vector6::from(*rate_m_s),
         }
     }
 }
@@ -85,17 +85,17 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
-    /// Advances the estimate by `dt` seconds, in which feedback accelerates the platform by u.
-    pub fn advance(&mut self, dt: f64, FeedbackAcceleration(u): &FeedbackAcceleration) {
+    /// Advances the estimate by `dt_s` seconds, in which feedback accelerates the platform by u.
+    pub fn advance(&mut self, dt_s: f64, FeedbackAcceleration(u): &FeedbackAcceleration) {
         let acceleration = self.disturbance - u;
-        self.value += (self.rate + acceleration * (0.5 * dt)) * dt;
-        self.rate += acceleration * dt;
+        self.value += (self.rate + acceleration * (0.5 * dt_s)) * dt_s;
+        self.rate += acceleration * dt_s;
     }
 
-    /// Estimate `dt` seconds later.
-    pub fn after(&self, dt: f64, u: &FeedbackAcceleration) -> Self {
+    /// Estimate `dt_s` seconds later.
+    pub fn after(&self, dt_s: f64, u: &FeedbackAcceleration) -> Self {
         let mut after = *self;
-        after.advance(dt, u);
+        after.advance(dt_s, u);
         after
     }
 

@@ -53,10 +53,10 @@ struct Poses<S: Simd> {
 /// poses_near(&machine, &[machine.home_pose(); 3], &[leg_lengths(&machine, &pose); 3], &mut found);
 /// assert!((found[2].unwrap().position - pose.position).norm() < 1e-14);
 /// ```
-pub fn poses_near(machine: &Machine, starts: &[Pose], lengths: &[[f64; LEGS]], poses: &mut [Option<Pose>]) {
+pub fn poses_near(machine: &Machine, starts: &[Pose], lengths_m: &[[f64; LEGS]], poses: &mut [Option<Pose>]) {
     let joints = &machine.joints;
     let legs = in_lane_order(joints);
-    let mut tasks = starts.chunks(LANES).zip(lengths.chunks(LANES)).zip(poses.chunks_mut(LANES));
+    let mut tasks = starts.chunks(LANES).zip(lengths_m.chunks(LANES)).zip(poses.chunks_mut(LANES));
     dispatch!(machine.level, simd => {
         for ((starts, lengths), poses) in &mut tasks {
             let (Some(first_start), Some(first_lengths)) = (starts.first(), lengths.first()) else { continue };

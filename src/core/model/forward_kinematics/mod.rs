@@ -91,10 +91,10 @@ pub struct NewtonReport {
 pub fn refine(
     machine: &Machine,
     kinematic_state: &mut KinematicState,
-    lengths: &[f64; LEGS],
+    lengths_m: &[f64; LEGS],
 ) -> NewtonReport {
     let joints = &machine.joints;
-    let target = joints.triples.pack(lengths);
+    let target = joints.triples.pack(lengths_m);
     dispatch!(machine.level, simd => {
         let legs = kinematic_state.legs.load(simd);
         let factorization = Factorization::load(simd, joints, &kinematic_state.factorization);

@@ -92,8 +92,8 @@ impl<S: Simd> Iterate<S> {
 
 impl<'a, S: Simd> Newton<'a, S> {
     #[inline(always)]
-    pub fn new(simd: S, joints: &'a Joints, target: f64x8<S>) -> Self {
-        Self { simd, joints, target, inverse_target: f64x8::splat(simd, 1.0) / target }
+    pub fn new(simd: S, joints: &'a Joints, target_m: f64x8<S>) -> Self {
+        Self { simd, joints, target: target_m, inverse_target: f64x8::splat(simd, 1.0) / target_m }
     }
 
     #[inline(always)]

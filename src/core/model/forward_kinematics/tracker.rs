@@ -76,14 +76,14 @@ impl Tracker {
     }
 
     /// Takes one trusted step toward the pose with these lengths. Also returns the number of iterations.
-    pub fn advance(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (TrackingResult, u32) {
+    pub fn advance(&mut self, machine: &Machine, lengths_m: &[f64; LEGS]) -> (TrackingResult, u32) {
         let mut iterations = 0;
         let mut tracked = TrackingResult::Found;
-        let mut report = self.step(machine, lengths, &mut iterations);
+        let mut report = self.step(machine, lengths_m, &mut iterations);
         if report.outcome == Outcome::LeftTrustedRegion {
             tracked = TrackingResult::Approaching;
             let here = Vector6::from(self.kinematic_state.lengths(machine));
-            let part = here + (Vector6::from(*lengths) - here) * (TRUSTED_STEP_SHARE / report.step_ratio);
+            let part = here + (Vector6::from(*lengths_m) - here) * (TRUSTED_STEP_SHARE / report.step_ratio);
             report = self.step(machine, &part.into(), &mut iterations);
         }
         (if report.outcome == Outcome::Solved { tracked } else { TrackingResult::NotConverged }, iterations)
@@ -98,10 +98,10 @@ impl Tracker {
 
     /// Takes steps until the pose is found. Also returns the number of iterations. Not for the cycle: the
     /// steps may take longer than a cycle.
-    pub fn find(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (TrackingResult, u32) {
+    pub fn find(&mut self, machine: &Machine, lengths_m: &[f64; LEGS]) -> (TrackingResult, u32) {
         let mut iterations = 0;
         for _ in 0..MAX_TRACKING_STEPS {
-            let (tracked, spent) = self.advance(machine, lengths);
+            let (tracked, spent) = self.advance(machine, lengths_m);
             iterations += spent;
             if tracked != TrackingResult::Approaching {
                 return (tracked, iterations);

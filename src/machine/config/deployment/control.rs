@@ -212,7 +212,7 @@ impl Plant<'_> {
     }
 
     /// Bandwidth of the estimator \[Hz\]: the optimum for noise and disturbances, bounded by the ratio that the delay
-    /// allows. It is slower if a loop would not be stable with [`STABLE_MASSES`], and as fast as a loop if only that is
+    /// allows. It is slower if a loop would not be stable with [`STABLE_MASS_RATIOS`], and as fast as a loop if only that is
     /// stable.
     fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
         let Self { realtime, noise, drive, .. } = self;

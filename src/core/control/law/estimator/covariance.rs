@@ -80,9 +80,9 @@ impl NoiseModel {
 
 impl Covariance {
     /// Advances the covariance over a number of periods without a reading.
-    pub fn advance(&mut self, model: &NoiseModel, periods: f64) {
+    pub fn advance(&mut self, model: &NoiseModel, period_count: f64) {
         let Self { ee, ew, ed, ww, wd, dd } = *self;
-        let (n, half) = (periods, 0.5 * periods * periods);
+        let (n, half) = (period_count, 0.5 * period_count * period_count);
         let (by_e, by_w, by_d) = (ee + n * ew + half * ed, ew + n * ww + half * wd, ed + n * wd + half * dd);
         let (rate_by_w, rate_by_d) = (ww + n * wd, wd + n * dd);
         let third = (model.bandwidth_rad_s * model.period_s) * (model.bandwidth_rad_s * model.period_s);

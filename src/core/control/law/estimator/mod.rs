@@ -17,7 +17,7 @@
 //!
 //! The disturbance replaces the steady error that feedback would otherwise need against a payload, friction
 //! or a process force. If it is compensated, its estimate is bounded
-//! ([`EstimatorConstants::max_compensated`]), so that the end of a long contact has an effect at once.
+//! ([`EstimatorConstants::max_compensated_acceleration`]), so that the end of a long contact has an effect at once.
 //! Sources: Luenberger (1971); Smith (1957) for the dead time.
 //!
 //! The model lacks elastic legs, drive lag other than a dead time, and coloured noise.
@@ -128,18 +128,18 @@ impl EstimatorConstants {
     pub fn new(
         noise: NoiseModel,
         reading_errors: ReadingErrors,
-        max_compensated: Vector6<f64>,
-        largest_disturbance: f64,
+        max_compensated_acceleration: Vector6<f64>,
+        max_plausible_acceleration_m_s2: f64,
     ) -> Self {
-        Self { noise, covariance: noise.steady().0, max_compensated_acceleration: max_compensated, reading_errors, max_plausible_acceleration_m_s2: largest_disturbance }
+        Self { noise, covariance: noise.steady().0, max_compensated_acceleration, reading_errors, max_plausible_acceleration_m_s2 }
     }
 
-    /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, plus the
+    /// Largest plausible innovation of a leg, `dt_s` after the last measurement \[m\]: noise, plus the
     /// displacement by a disturbance that the estimate does not yet contain, `a (1 / we^2 + dt^2 / 2)`.
-    pub fn innovation_bound(&self, dt: f64) -> f64 {
+    pub fn innovation_bound(&self, dt_s: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth_rad_s;
         MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation_m)
-            + self.max_plausible_acceleration_m_s2 * (lag * lag + 0.5 * dt * dt)
+            + self.max_plausible_acceleration_m_s2 * (lag * lag + 0.5 * dt_s * dt_s)
     }
 }
 

@@ -109,7 +109,7 @@ impl AngleRanges {
     /// Whether each angle of a rotation keeps a margin \[rad\] from the ends of its range. The margin is at
     /// most [`MAX_MARGIN_RATIO`] of the width.
     #[inline(always)]
-    pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, margin: f64) -> bool {
+    pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, margin_rad: f64) -> bool {
         let c = cosine_of_beta(r);
         let both = |lanes: [f64; LANES / 2]| {
             let lanes = f64x4::load_array(simd, lanes);
@@ -123,7 +123,7 @@ impl AngleRanges {
         let (end_sine, end_cosine) = (load(&self.sine), load(&self.cosine));
         let distance_sine = sine * end_cosine - cosine * end_sine;
         let distance_cosine = (cosine * end_cosine + sine * end_sine) * load(&self.wide_sign);
-        let margin = load(&self.max_margin).min(f64x8::splat(simd, margin)) * both([c, 1.0, c, 0.0]);
+        let margin = load(&self.max_margin).min(f64x8::splat(simd, margin_rad)) * both([c, 1.0, c, 0.0]);
         let is_kept = distance_sine.simd_ge(margin) | distance_cosine.simd_le(load(&self.far_cosine));
         is_kept.all_true() & self.is_nonempty
     }

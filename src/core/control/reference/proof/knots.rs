@@ -20,12 +20,12 @@ pub(in crate::control::reference) struct Knots {
 }
 
 impl Knots {
-    /// Chooses the number n of intervals: at least the square root of `square` and the cube root of `cube`,
+    /// Chooses the number n of intervals: at least the square root of `square_s2` and the cube root of `cube_s3`,
     /// but at most [`MAX_INTERVALS`].
-    pub fn new(duration: f64, square: f64, cube: f64) -> Self {
-        let are_too_few = |n: &u32| f64::from(n * n * n) < cube || f64::from(n * n) < square;
+    pub fn new(duration_s: f64, square_s2: f64, cube_s3: f64) -> Self {
+        let are_too_few = |n: &u32| f64::from(n * n * n) < cube_s3 || f64::from(n * n) < square_s2;
         let intervals = MIN_INTERVALS + (MIN_INTERVALS..MAX_INTERVALS).filter(are_too_few).count() as u32;
-        Self { intervals, duration }
+        Self { intervals, duration: duration_s }
     }
 
     /// Instant of a knot \[s\].

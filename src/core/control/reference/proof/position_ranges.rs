@@ -28,11 +28,11 @@ impl PositionRanges {
     /// Whether each coordinate of both positions keeps a margin from the ends of its range. The margin is at
     /// most [`MAX_MARGIN_RATIO`] of the width.
     #[inline(always)]
-    pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], margin: &Vector3<f64>) -> bool {
+    pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], margin_m: &Vector3<f64>) -> bool {
         let load = |lanes: Padded| f64x4::load_array(simd, lanes);
         let [first, second] = positions.map(|position| load(padded(position)));
         let room = (first.min(second) - load(self.lowest)).min(load(self.highest) - first.max(second));
-        room.simd_ge(load(padded(margin)).min(load(self.max_margin))).all_true()
+        room.simd_ge(load(padded(margin_m)).min(load(self.max_margin))).all_true()
     }
 }
 

@@ -44,9 +44,9 @@ impl HeldStop {
 
     /// Holds a stop of this kind, verified from the present motion on. A stop that brakes at once was planned
     /// in the spare slot.
-    pub fn adopt(&mut self, kind: StopKind, strength: f64) {
+    pub fn adopt(&mut self, kind: StopKind, strength_share: f64) {
         self.is_second_held ^= kind == StopKind::BrakeAtOnce;
-        self.strength = strength;
+        self.strength = strength_share;
         self.phase = Phase::Verified(kind);
     }
 
@@ -64,18 +64,18 @@ impl HeldStop {
         }
     }
 
-    /// Motion after a step of `h` seconds along the stop, which is followed from now on.
+    /// Motion after a step of `dt_s` seconds along the stop, which is followed from now on.
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
-    pub fn follow(&mut self, constants: &Constants, motion: &Motion, h: f64) -> Motion {
+    pub fn follow(&mut self, constants: &Constants, motion: &Motion, dt_s: f64) -> Motion {
         match self.phase {
             Phase::AtRest => self.begin(constants, StopKind::ReleaseFirst, &at_rest(&motion.pose)),
             Phase::Verified(kind) => self.begin(constants, kind, motion),
             Phase::Followed => {}
         }
-        self.elapsed_s += h;
+        self.elapsed_s += dt_s;
         let next = self.held().state_at(constants.machine().level, self.elapsed_s);
-        let pose = advanced(&motion.pose, &self.state, &next, h);
+        let pose = advanced(&motion.pose, &self.state, &next, dt_s);
         self.state = next;
         let PoseStopState { orientation, position } = next;
         Motion {

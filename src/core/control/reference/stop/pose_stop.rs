@@ -81,9 +81,9 @@ impl PoseStop {
         }
     }
 
-    /// State `t` seconds after the start.
-    pub fn state_at(&self, level: Level, t: f64) -> PoseStopState {
-        dispatch!(level, simd => self.at(simd, t))
+    /// State `t_s` seconds after the start.
+    pub fn state_at(&self, level: Level, t_s: f64) -> PoseStopState {
+        dispatch!(level, simd => self.at(simd, t_s))
     }
 
     /// Time to rest \[s\].
@@ -91,17 +91,17 @@ impl PoseStop {
         self.orientation.duration_s.max(self.position.duration_s)
     }
 
-    /// State `t` seconds after the start, in SIMD lanes.
+    /// State `t_s` seconds after the start, in SIMD lanes.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, t: f64) -> PoseStopState {
-        PoseStopState { orientation: self.orientation.at(simd, t), position: self.position.at(simd, t) }
+    pub fn at<S: Simd>(&self, simd: S, t_s: f64) -> PoseStopState {
+        PoseStopState { orientation: self.orientation.at(simd, t_s), position: self.position.at(simd, t_s) }
     }
 
-    /// Bounds on the distance that the stop covers within half of `dt` before or after a state: around a
-    /// knot, with knots `dt` apart.
+    /// Bounds on the distance that the stop covers within half of `dt_s` before or after a state: around a
+    /// knot, with knots `dt_s` apart.
     #[inline(always)]
-    pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Pair<f64> {
-        let half = 0.5 * dt;
+    pub fn reach(&self, state: &PoseStopState, dt_s: f64, limits: &Limits) -> Pair<f64> {
+        let half = 0.5 * dt_s;
         let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
             half * stop.peak_velocity.min(state.velocity.norm() + 0.5 * half * limits.acceleration)
         };
@@ -112,14 +112,14 @@ impl PoseStop {
     }
 }
 
-/// Pose after the section of a stop between two states, `dt` seconds apart.
+/// Pose after the section of a stop between two states, `dt_s` seconds apart.
 pub(in crate::control::reference) fn advanced(
     pose: &Pose,
     from: &PoseStopState,
     to: &PoseStopState,
-    dt: f64,
+    dt_s: f64,
 ) -> Pose {
-    pose.displaced(&displacement(from, to, dt))
+    pose.displaced(&displacement(from, to, dt_s))
 }
 
 /// The same pose without orthonormalizing the rotation, for the few knots of an examination.
@@ -128,9 +128,9 @@ pub(in crate::control::reference) fn advanced_without_orthonormalizing(
     pose: &Pose,
     from: &PoseStopState,
     to: &PoseStopState,
-    dt: f64,
+    dt_s: f64,
 ) -> Pose {
-    pose.extrapolated(&displacement(from, to, dt))
+    pose.extrapolated(&displacement(from, to, dt_s))
 }
 
 #[inline(always)]

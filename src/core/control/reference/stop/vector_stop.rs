@@ -229,14 +229,14 @@ impl Stop {
         pieces.finish_with_rest((peak * peak + across_speed * across_speed).sqrt());
     }
 
-    /// State `t` seconds after the start; at rest from the end on.
+    /// State `t_s` seconds after the start; at rest from the end on.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, t: f64) -> StopState {
+    pub fn at<S: Simd>(&self, simd: S, t_s: f64) -> StopState {
         // Compares all starts without a branch: successive calls are mostly for knots in different pieces.
-        let begun = self.begins.iter().map(|begin| usize::from(*begin <= t)).sum::<usize>();
+        let begun = self.begins.iter().map(|begin| usize::from(*begin <= t_s)).sum::<usize>();
         let index = begun.saturating_sub(1);
         match (self.pieces.get(index), self.begins.get(index)) {
-            (Some(piece), Some(begin)) => piece.after(simd, t - begin),
+            (Some(piece), Some(begin)) => piece.after(simd, t_s - begin),
             _ => StopState::default(),
         }
     }

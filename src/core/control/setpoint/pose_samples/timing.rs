@@ -37,19 +37,19 @@ pub(in crate::control::setpoint::pose_samples) struct SampleTiming {
 }
 
 impl SampleTiming {
-    pub fn update(&mut self, interval: f64, age: f64) {
+    pub fn update(&mut self, interval_s: f64, age_s: f64) {
         if self.interval_count == 0.0 {
-            (self.interval_s, self.age, self.before) = (interval, age, [[interval, age]; 2]);
+            (self.interval_s, self.age, self.before) = (interval_s, age_s, [[interval_s, age_s]; 2]);
         }
         self.interval_count = (self.interval_count + 1.0).min(1.0 / ESTIMATION_GAIN);
         let gain = 1.0 / self.interval_count;
-        let deviation = (age - self.age).abs().min(MAX_JITTER_RATIO * self.interval_s);
+        let deviation = (age_s - self.age).abs().min(MAX_JITTER_RATIO * self.interval_s);
         self.deviation += gain * (deviation - self.deviation);
         // Medians of three: a single lost sample changes no estimate, and a new rate changes it at once.
         let [[interval_2, age_2], [interval_1, age_1]] = self.before;
-        self.interval_s += gain * (median(interval_2, interval_1, interval) - self.interval_s);
-        self.age += gain * (median(age_2, age_1, age) - self.age);
-        self.before = [[interval_1, age_1], [interval, age]];
+        self.interval_s += gain * (median(interval_2, interval_1, interval_s) - self.interval_s);
+        self.age += gain * (median(age_2, age_1, age_s) - self.age);
+        self.before = [[interval_1, age_1], [interval_s, age_s]];
     }
 
     /// Delay \[s\] at which the samples around an instant, and the one after, have nearly always arrived.
@@ -67,8 +67,8 @@ pub(in crate::control::setpoint::pose_samples) struct Delay {
 }
 
 impl Delay {
-    pub fn new(value: f64, since_ns: u64) -> Self {
-        Self { since_ns, value, rate: 0.0 }
+    pub fn new(value_s: f64, since_ns: u64) -> Self {
+        Self { since_ns, value: value_s, rate: 0.0 }
     }
 
     pub fn at(&self, instant_ns: u64) -> f64 {
@@ -79,10 +79,10 @@ impl Delay {
         if seconds_between(self.since_ns, instant_ns) < DELAY_TRANSITION_S { self.rate } else { 0.0 }
     }
 
-    /// Delay that moves from its present value toward `goal`.
-    pub fn toward(&self, goal: f64, now_ns: u64) -> Self {
+    /// Delay that moves from its present value toward `goal_s`.
+    pub fn toward(&self, goal_s: f64, now_ns: u64) -> Self {
         let value = self.at(now_ns);
-        let rate = ((goal - value) / DELAY_TRANSITION_S).clamp(-MAX_DELAY_RATE, MAX_DELAY_RATE);
+        let rate = ((goal_s - value) / DELAY_TRANSITION_S).clamp(-MAX_DELAY_RATE, MAX_DELAY_RATE);
         Self { since_ns: now_ns, value, rate }
     }
 }
