@@ -30,7 +30,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let (length, rate) = (legs.length_m, Some(legs.rate_m_s));
         let output = controller.step(&Input {
             release_ns: now_ns,
-            measurement: Some(Measurement { time_ns: now_ns, length_m: length, rate_m_s: rate, ..Measurement::default() }),
+            measurement: Some(Measurement {
+                time_ns: now_ns,
+                length_m: length,
+                rate_m_s: rate,
+                ..Measurement::default()
+            }),
             setpoint: Some(Setpoint::motion(now_ns, straight_move(&home, &top, &rise(t - 1.0, 1.0)))),
             request: Some(OperatorRequest {
                 request: Request::Engage,

@@ -147,7 +147,8 @@ fn lumped_mass(machine: &Machine) -> f64 {
 }
 
 fn nothing() -> Link {
-    let transverse_inertia = TransverseInertia { constant_kg_m2: 0.0, quadratic_kg: 0.0, reference_length_m: 0.0 };
+    let transverse_inertia =
+        TransverseInertia { constant_kg_m2: 0.0, quadratic_kg: 0.0, reference_length_m: 0.0 };
     Link { mass_kg: 0.0, center_of_mass_m: 0.0, axial_inertia_kg_m2: 0.0, transverse_inertia }
 }
 
@@ -163,7 +164,11 @@ fn with_points(machine: &Machine, mass: f64) -> Platform {
         let r: Vector3<f64> = at - center_of_mass;
         own + (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *mass
     };
-    Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia: parts.iter().map(about_center).sum() }
+    Platform {
+        mass_kg: mass,
+        center_of_mass_m: center_of_mass,
+        inertia: parts.iter().map(about_center).sum(),
+    }
 }
 
 /// The simple fidelities are the exact model of another machine.

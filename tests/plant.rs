@@ -42,10 +42,24 @@ fn everything() -> Imperfections {
     Imperfections {
         seed: 5,
         drive: DriveErrors { bandwidth_hz: Some(80.0), force_step_n: 5.0, dead_time_ns: 1_500_000 },
-        friction: Friction { viscous_n_s_m: 200.0, coulomb_n: 150.0, stiction_n: 100.0, ..Friction::default() },
+        friction: Friction {
+            viscous_n_s_m: 200.0,
+            coulomb_n: 150.0,
+            stiction_n: 100.0,
+            ..Friction::default()
+        },
         leg: Some(ElasticLeg { stiffness_n_per_m: 5e7, damping_n_s_m: 1e4, backlash_m: 2e-5 }),
-        sensor: SensorErrors { length_step_m: 1e-6, rate_step_m_s: 1e-4, length_noise_m: 2e-6, rate_noise_m_s: 1e-4 },
-        build: BuildErrors { payload_kg: 100.0, payload_at_m: Vector3::new(0.1, 0.0, 0.5), joint_deviation_m: 1e-4 },
+        sensor: SensorErrors {
+            length_step_m: 1e-6,
+            rate_step_m_s: 1e-4,
+            length_noise_m: 2e-6,
+            rate_noise_m_s: 1e-4,
+        },
+        build: BuildErrors {
+            payload_kg: 100.0,
+            payload_at_m: Vector3::new(0.1, 0.0, 0.5),
+            joint_deviation_m: 1e-4,
+        },
         external: ExternalWrench {
             wrench: Wrench { torque: Vector3::new(50.0, 0.0, 0.0), force: Vector3::new(0.0, 100.0, 0.0) },
             frequency_hz: 2.0,

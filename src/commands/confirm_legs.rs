@@ -126,8 +126,13 @@ fn targets(
             return Err("no pose has these lengths".to_owned());
         };
         let x = task_coordinates(tracker.pose(), &machine.home);
-        let order =
-            GotoOrder { target: x.map(Some), relative: false, home: false, speed_share: SPEED, tolerance_m: None };
+        let order = GotoOrder {
+            target: x.map(Some),
+            relative: false,
+            home: false,
+            speed_share: SPEED,
+            tolerance_m: None,
+        };
         let plan = GotoPlan::new(config, &constants, &order, &Coordinates::default(), false, seen, || true);
         plan.map(|plan| plan.to).map_err(|error| error.to_string())
     };

@@ -96,7 +96,8 @@ pub fn inverse_dynamics(
         let joint_values: Vec<_> = added.iter().flat_map(|(_, of)| dynamics.iter().map(of)).collect();
         unsolved.add(time(row), forces.iter().chain(&joint_values).all(|value| value.is_finite()));
         let commands = Transmission::new(&machine.actuator, &motions.rate_m_s).commands(&forces);
-        let known = forces.into_iter().chain(motions.length_m).chain(motions.rate_m_s).chain(motions.accel_m_s2);
+        let known =
+            forces.into_iter().chain(motions.length_m).chain(motions.rate_m_s).chain(motions.accel_m_s2);
         let known = known.chain(commands);
         writer.row([time(row)].into_iter().chain(known).chain(joint_values));
     }

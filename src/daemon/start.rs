@@ -126,7 +126,12 @@ pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
     let input = Input {
         release_ns: 1,
         setpoint: Some(Setpoint::motion(1, task)),
-        measurement: Some(Measurement { time_ns: 1, length_m: length, rate_m_s: Some([0.0; 6]), ..Measurement::default() }),
+        measurement: Some(Measurement {
+            time_ns: 1,
+            length_m: length,
+            rate_m_s: Some([0.0; 6]),
+            ..Measurement::default()
+        }),
         ..Input::default()
     };
     for _ in 0..WARM_UP_CYCLES {

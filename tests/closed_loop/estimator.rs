@@ -38,7 +38,8 @@ fn rms_um(
 }
 
 fn with_noise(metres: f64) -> Imperfections {
-    let sensor = SensorErrors { length_noise_m: metres, rate_noise_m_s: 1e2 * metres, ..SensorErrors::default() };
+    let sensor =
+        SensorErrors { length_noise_m: metres, rate_noise_m_s: 1e2 * metres, ..SensorErrors::default() };
     Imperfections { seed: 1, sensor, ..Imperfections::default() }
 }
 

@@ -67,7 +67,9 @@ fn played_in(
             let axis = Vector3::new(turn.cos(), turn.sin(), 0.0) * degrees.to_radians();
             platform.gravity_m_s2 = Rotation3::new(axis) * platform.gravity_m_s2;
         }
-        World::Joints(joints) => imperfections.build = BuildErrors { joint_deviation_m: joints, ..BuildErrors::default() },
+        World::Joints(joints) => {
+            imperfections.build = BuildErrors { joint_deviation_m: joints, ..BuildErrors::default() }
+        }
         World::Stiction(share) => {
             imperfections.friction = Friction { stiction_n: share * most, ..Friction::default() };
         }
@@ -128,7 +130,8 @@ fn alter(world: World, truth: &Machine, stretch: &mut RecordedStretch) {
             }
             World::LoosePayload(share) => {
                 let mass = share * truth.platform.mass_kg;
-                let proper = motion.pose.rotation.transpose() * (motion.acceleration.linear - truth.gravity_m_s2);
+                let proper =
+                    motion.pose.rotation.transpose() * (motion.acceleration.linear - truth.gravity_m_s2);
                 // It sticks up to a slope of 5 %, and slides slowly to its stop beyond.
                 for axis in 0..2 {
                     if proper[axis].abs() > 0.05 * proper.z {

@@ -269,7 +269,8 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
         if k < 150 {
             input.measurement = Some(stale);
         } else {
-            furthest = (0..6).fold(0.0, |most, leg| most.max((fresh.length_m[leg] - stale.length_m[leg]).abs()));
+            furthest =
+                (0..6).fold(0.0, |most, leg| most.max((fresh.length_m[leg] - stale.length_m[leg]).abs()));
         }
         let output = rig.cycle(&input);
         assert_eq!(

@@ -63,7 +63,12 @@ fn noise_gets_no_more_than_the_limit() {
             let mut input = rig.input(&task);
             let measurement = input.measurement.as_mut().unwrap();
             measurement.length_m.iter_mut().for_each(|length| *length += size * random());
-            measurement.rate_m_s.as_mut().unwrap().iter_mut().for_each(|rate| *rate += 100.0 * size * random());
+            measurement
+                .rate_m_s
+                .as_mut()
+                .unwrap()
+                .iter_mut()
+                .for_each(|rate| *rate += 100.0 * size * random());
             let output = rig.cycle(&input);
             assert!(largest(&output.command_n) <= limit);
             assert!(output.state.has_control() || output.command_n == [0.0; LEGS]);

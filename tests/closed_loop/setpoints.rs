@@ -31,7 +31,8 @@ fn a_setpoint_is_checked_against_each_limit() {
             machine.actuator.max_rate_m_s = 1e3;
             assert_eq!(check(&machine, &wide, fast), result, "velocity {axis}");
             let rates = leg_motion(&machine, &fast.motion()).rate_m_s;
-            machine.actuator.max_rate_m_s = rates.iter().fold(0.0_f64, |most, rate| most.max(rate.abs())) / share;
+            machine.actuator.max_rate_m_s =
+                rates.iter().fold(0.0_f64, |most, rate| most.max(rate.abs())) / share;
             fast.xd[axis] *= 0.99 / share;
             machine.actuator.max_rate_m_s *= 0.99 / share;
             assert_eq!(check(&machine, &wide, fast), result, "leg rate {axis}");

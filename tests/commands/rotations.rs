@@ -77,7 +77,11 @@ fn state(t: f64) -> TaskState {
     let profile = rise(t, 2.0);
     let way = Vector6::new(0.3, -0.25, 0.35, 0.02, -0.03, 0.04);
     let home = Vector6::new(0.0, 0.0, 0.0, 1.1, 0.0, 0.0);
-    TaskState { x: home + way * profile.value_share, xd: way * profile.rate_per_s, xdd: way * profile.accel_per_s2 }
+    TaskState {
+        x: home + way * profile.value_share,
+        xd: way * profile.rate_per_s,
+        xdd: way * profile.accel_per_s2,
+    }
 }
 
 /// Number of a row, and its time.

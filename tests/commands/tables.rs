@@ -66,7 +66,10 @@ fn a_file_is_the_motion_that_it_was_made_from() {
         for t in (0..=1500).map(|k| 1e-3 * f64::from(k)) {
             let (state, s) = (read.at(t), rise(t, SECONDS));
             assert!((state.x[3] - HOME - WAY * s.value_share).abs() < tolerance * WAY, "{t}: {state:?}");
-            assert!((state.xd[3] - WAY * s.rate_per_s).abs() < 0.01 * 1.875 * WAY / SECONDS, "{t}: {state:?}");
+            assert!(
+                (state.xd[3] - WAY * s.rate_per_s).abs() < 0.01 * 1.875 * WAY / SECONDS,
+                "{t}: {state:?}"
+            );
             assert!([0, 1, 2, 4, 5].iter().all(|axis| state.x[*axis] == 0.0), "{t}: {state:?}");
         }
     }

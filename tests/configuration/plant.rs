@@ -52,8 +52,17 @@ fn imperfections_arrive_where_they_belong() {
         drive: DriveErrors { bandwidth_hz: Some(80.0), force_step_n: 1.0, dead_time_ns: 1_500_500 },
         friction: Friction { viscous_n_s_m: 2.0, coulomb_n: 3.0, stiction_n: 4.0, stribeck_speed_m_s: 0.05 },
         leg: Some(ElasticLeg { stiffness_n_per_m: 5e7, damping_n_s_m: 6.0, backlash_m: 7e-5 }),
-        sensor: SensorErrors { length_step_m: 1e-6, rate_step_m_s: 2e-6, length_noise_m: 3e-6, rate_noise_m_s: 4e-6 },
-        build: BuildErrors { payload_kg: 8.0, payload_at_m: Vector3::new(1.0, 2.0, 3.0), joint_deviation_m: 9e-5 },
+        sensor: SensorErrors {
+            length_step_m: 1e-6,
+            rate_step_m_s: 2e-6,
+            length_noise_m: 3e-6,
+            rate_noise_m_s: 4e-6,
+        },
+        build: BuildErrors {
+            payload_kg: 8.0,
+            payload_at_m: Vector3::new(1.0, 2.0, 3.0),
+            joint_deviation_m: 9e-5,
+        },
         external: ExternalWrench {
             wrench: Wrench { force: Vector3::new(4.0, 5.0, 6.0), torque: Vector3::new(7.0, 8.0, 9.0) },
             frequency_hz: 10.0,

@@ -72,8 +72,13 @@ impl Recording {
             }
             if let Some(before) = before {
                 let change = |(now, before): (&f64, &f64)| (now - before).abs();
-                let step =
-                    sample.output.command_n.iter().zip(&before.output.command_n).map(change).fold(0.0, f64::max);
+                let step = sample
+                    .output
+                    .command_n
+                    .iter()
+                    .zip(&before.output.command_n)
+                    .map(change)
+                    .fold(0.0, f64::max);
                 over(&mut peaks.force_rate, step / period_s / parameters.force_rate_n_s);
                 let then = before.acceleration.unwrap_or_default();
                 over(&mut peaks.jerk, jerk_share(parameters, &then, &now));

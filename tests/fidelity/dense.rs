@@ -67,8 +67,18 @@ fn the_worst_that_is_reported_exists() {
         let [inside, corners] = dense(&scene);
         for ((error, inside), corners) in comparison.errors.iter().zip(&inside.errors).zip(&corners.errors) {
             let (seen, name) = (inside.max_n.max(corners.max_n), &scene.name);
-            assert!(seen >= 0.95 * error.max_n, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max_n);
-            assert!(seen <= 1.05 * error.max_n, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max_n);
+            assert!(
+                seen >= 0.95 * error.max_n,
+                "{name}, {:?}: {} N, seen {seen} N",
+                error.fidelity,
+                error.max_n
+            );
+            assert!(
+                seen <= 1.05 * error.max_n,
+                "{name}, {:?}: {} N, seen {seen} N",
+                error.fidelity,
+                error.max_n
+            );
         }
     }
 }
@@ -95,7 +105,10 @@ fn every_machine_has_an_envelope_of_its_own() {
         assert!(full.bounds().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
         for k in 0..CORNER_COUNT {
             let sample = FidelitySample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
-            assert!(sample.is_ok_and(|s| s.peak_n < 0.8 * machine.actuator.max_force_n), "{name}, corner {k}");
+            assert!(
+                sample.is_ok_and(|s| s.peak_n < 0.8 * machine.actuator.max_force_n),
+                "{name}, corner {k}"
+            );
             let rates = leg_motion(&machine, &full.at(&full.corner(k)).motion()).rate_m_s;
             // Only the telescope's legs are so slow that this decides.
             let most = 0.8 * machine.actuator.max_rate_m_s;

@@ -49,7 +49,8 @@ impl OutputHash {
         self.word(*missed_measurements);
         self.word(*missed_setpoints);
         self.optional(platform.as_ref(), |hash, platform| {
-            let PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity } = platform;
+            let PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity } =
+                platform;
             hash.pose(pose);
             hash.twist(twist);
             hash.numbers([condition, time_to_singularity]);

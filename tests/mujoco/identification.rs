@@ -78,8 +78,15 @@ fn written(table: &Table, machine: &Machine) -> Table {
     let elements = [("xx", i.m11), ("yy", i.m22), ("zz", i.m33), ("xy", i.m12), ("xz", i.m13), ("yz", i.m23)];
     let inertia: Table = elements.into_iter().map(|(key, value)| (key.to_owned(), value.into())).collect();
     set(&mut table, "platform", "inertia_kg_m2", inertia);
-    for (section, Link { mass_kg: mass, center_of_mass_m: center_of_mass, axial_inertia_kg_m2: axial_inertia, transverse_inertia }) in
-        [("cylinder", &machine.cylinder), ("rod", &machine.rod)]
+    for (
+        section,
+        Link {
+            mass_kg: mass,
+            center_of_mass_m: center_of_mass,
+            axial_inertia_kg_m2: axial_inertia,
+            transverse_inertia,
+        },
+    ) in [("cylinder", &machine.cylinder), ("rod", &machine.rod)]
     {
         assert_eq!(transverse_inertia.quadratic_kg, 0.0, "a number in the file");
         set(&mut table, section, "mass_kg", *mass);
@@ -123,7 +130,9 @@ impl Trial {
             });
         let friction = folder.join("friction.csv");
         let mut rows = String::from("load_friction,stribeck_n,stribeck_speed_m_s\n");
-        for (load, coulomb) in truth.actuator.load_friction_share.iter().zip(truth.actuator.coulomb_friction_n) {
+        for (load, coulomb) in
+            truth.actuator.load_friction_share.iter().zip(truth.actuator.coulomb_friction_n)
+        {
             let [excess, speed] = [0.3, 0.008].map(|mean| mean * (1.0 + 0.25 * random.signed()));
             writeln!(rows, "{load},{},{speed}", excess * coulomb).unwrap();
         }

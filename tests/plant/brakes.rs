@@ -45,7 +45,10 @@ fn without_force_all_legs_stop_in_a_straight_line_at_the_same_time() {
             let rates = simulator.leg_motion().rate_m_s;
             let share = (1.0 - t / duration).max(0.0);
             for i in 0..LEGS {
-                assert!((rates[i] - share * begin.rate_m_s[i]).abs() < 1e-9 * fastest, "{name} leg {i} at {t}");
+                assert!(
+                    (rates[i] - share * begin.rate_m_s[i]).abs() < 1e-9 * fastest,
+                    "{name} leg {i} at {t}"
+                );
                 assert!(rates[i] * begin.rate_m_s[i] >= -1e-12, "{name}: leg {i} turned back");
                 assert!(rates[i].abs() <= before[i].abs() + 1e-12, "{name}: leg {i} sped up");
             }

@@ -25,7 +25,8 @@ fn total(machine: &Machine, simulator: &Simulator, spring: &ElasticLeg) -> f64 {
     for (length, (drive, rate)) in lengths.iter().zip(drives.length_m.iter().zip(drives.rate_m_s)) {
         let pressed = drive - length;
         let beyond = pressed - pressed.clamp(-half, half);
-        sum += 0.5 * spring.stiffness_n_per_m * beyond * beyond + 0.5 * machine.actuator.reflected_mass_kg * rate * rate;
+        sum += 0.5 * spring.stiffness_n_per_m * beyond * beyond
+            + 0.5 * machine.actuator.reflected_mass_kg * rate * rate;
     }
     sum
 }
@@ -145,7 +146,9 @@ fn a_stiff_leg_is_nearly_rigid() {
 #[test]
 fn the_step_keeps_the_tolerance() {
     let machine = smooth("motion_base");
-    let spring = |stiffness, damping| elastic(ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: damping, backlash_m: 0.0 });
+    let spring = |stiffness, damping| {
+        elastic(ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: damping, backlash_m: 0.0 })
+    };
     let lag = |hertz| {
         let mut wanted = Imperfections::default();
         wanted.drive.bandwidth_hz = Some(hertz);
@@ -189,7 +192,8 @@ fn the_step_keeps_the_tolerance() {
 fn what_cannot_be_seen_is_left_out() {
     let machine = machine("motion_base");
     let terms = |stiffness, backlash, hertz| {
-        let mut wanted = elastic(ElasticLeg { stiffness_n_per_m: stiffness, backlash_m: backlash, damping_n_s_m: 0.0 });
+        let mut wanted =
+            elastic(ElasticLeg { stiffness_n_per_m: stiffness, backlash_m: backlash, damping_n_s_m: 0.0 });
         wanted.drive.bandwidth_hz = Some(hertz);
         let terms = *simulator(&machine, &wanted).terms();
         (terms.elastic.is_some(), terms.lag_per_s.is_some(), terms.step_s < DEFAULT_STEP_S)

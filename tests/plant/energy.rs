@@ -106,7 +106,8 @@ fn add_link(
     sum: &mut Energy,
 ) {
     let inertia = &link.transverse_inertia;
-    let transverse = inertia.constant_kg_m2 + inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2);
+    let transverse =
+        inertia.constant_kg_m2 + inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2);
     let along = angular.dot(axis);
     let across = angular - axis * along;
     let spin = 0.5 * link.axial_inertia_kg_m2 * along * along;

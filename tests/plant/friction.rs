@@ -28,7 +28,8 @@ fn dry_friction_takes_energy_and_nothing_chatters() {
     {
         let mut machine = machine(name);
         machine.gravity_m_s2.fill(0.0);
-        (machine.actuator.viscous_friction_n_s_m, machine.actuator.coulomb_friction_n) = ([0.0; 6], [coulomb; 6]);
+        (machine.actuator.viscous_friction_n_s_m, machine.actuator.coulomb_friction_n) =
+            ([0.0; 6], [coulomb; 6]);
         // The energy of a rod whose inertia varies is not conserved to begin with.
         machine.rod.transverse_inertia.quadratic_kg = 0.0;
         let energies = coasting(&machine, 2.0);

@@ -44,7 +44,8 @@ fn a_configuration_without_the_keys_has_none_of_it() {
 /// Everything that draws random numbers.
 fn noisy(seed: u64) -> Imperfections {
     let mut wanted = Imperfections { seed, ..Imperfections::default() };
-    (wanted.sensor.length_noise_m, wanted.sensor.rate_noise_m_s, wanted.build.joint_deviation_m) = (1e-6, 1e-4, 1e-5);
+    (wanted.sensor.length_noise_m, wanted.sensor.rate_noise_m_s, wanted.build.joint_deviation_m) =
+        (1e-6, 1e-4, 1e-5);
     wanted
 }
 

@@ -14,7 +14,8 @@ fn floating(name: &str) -> Machine {
 /// A payload is a point with the force `m (a - g)`: the wrench it adds about C is known without any inertia tensor.
 #[test]
 fn a_payload_needs_the_forces_of_a_point_mass() {
-    let build = BuildErrors { payload_kg: 2.5, payload_at_m: Vector3::new(0.2, -0.1, 0.3), joint_deviation_m: 0.0 };
+    let build =
+        BuildErrors { payload_kg: 2.5, payload_at_m: Vector3::new(0.2, -0.1, 0.3), joint_deviation_m: 0.0 };
     assert_each_within(1e-12, "with payload, wrench", &MACHINES, |machine, motion| {
         let Motion { pose, twist: Twist { angular, .. }, acceleration } = motion;
         let loaded = build.built(machine, &mut Random::new(0));
@@ -73,7 +74,8 @@ fn an_external_wrench_swings() {
 
 #[test]
 fn stiction_is_there_at_rest_and_gone_at_speed() {
-    let friction = Friction { viscous_n_s_m: 10.0, coulomb_n: 4.0, stiction_n: 3.0, stribeck_speed_m_s: 0.01 };
+    let friction =
+        Friction { viscous_n_s_m: 10.0, coulomb_n: 4.0, stiction_n: 3.0, stribeck_speed_m_s: 0.01 };
     for sign in [-1.0, 1.0] {
         for (rate, expected) in [
             (0.0, 0.0),
@@ -113,7 +115,8 @@ fn a_leg_sticks_until_it_breaks_loose() {
 #[test]
 fn friction_dissipates_what_it_should() {
     let machine = floating("motion_base");
-    let friction = Friction { viscous_n_s_m: 300.0, coulomb_n: 100.0, stiction_n: 150.0, stribeck_speed_m_s: 0.02 };
+    let friction =
+        Friction { viscous_n_s_m: 300.0, coulomb_n: 100.0, stiction_n: 150.0, stribeck_speed_m_s: 0.02 };
     let mut simulator = simulator(&machine, &Imperfections { friction, ..Imperfections::default() });
     simulator.advance(0.1, Some(&[2000.0; LEGS]));
     let power =

@@ -159,13 +159,22 @@ fn a_new_machine_is_identified_as_the_guide_says() {
 
     let [found, truth] =
         [machine.path("NEW.toml"), platform.clone()].map(|path| Config::load(&path).unwrap().machine);
-    let mass = |machine: &hexad::model::machine::Machine| machine.platform.mass_kg + 6.0 * machine.rod.mass_kg;
+    let mass =
+        |machine: &hexad::model::machine::Machine| machine.platform.mass_kg + 6.0 * machine.rod.mass_kg;
     assert!((mass(&found) / mass(&truth) - 1.0).abs() < 2e-3, "{}", mass(&found));
     for leg in 0..6 {
         let [a, b] = [&found, &truth].map(|machine| &machine.actuator);
         assert!((a.force_scale[leg] / b.force_scale[leg] - 1.0).abs() < 2e-3, "{:?}", a.force_scale);
-        assert!((a.viscous_friction_n_s_m[leg] - b.viscous_friction_n_s_m[leg]).abs() < 0.5, "{:?}", a.viscous_friction_n_s_m);
-        assert!((a.coulomb_friction_n[leg] - b.coulomb_friction_n[leg]).abs() < 0.1, "{:?}", a.coulomb_friction_n);
+        assert!(
+            (a.viscous_friction_n_s_m[leg] - b.viscous_friction_n_s_m[leg]).abs() < 0.5,
+            "{:?}",
+            a.viscous_friction_n_s_m
+        );
+        assert!(
+            (a.coulomb_friction_n[leg] - b.coulomb_friction_n[leg]).abs() < 0.1,
+            "{:?}",
+            a.coulomb_friction_n
+        );
     }
 
     // A file that exists is kept, with one clear error.

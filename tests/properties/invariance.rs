@@ -16,8 +16,11 @@ fn moved_base(machine: &Machine, motion: &Motion, q: &Matrix3<f64>, d: &Vector3<
         universal_axis: legs.universal_axis.map(|u| q * u),
         ..legs
     };
-    let machine =
-        Machine { gravity_m_s2: q * machine.gravity_m_s2, joints: legs.joints(&machine.home), ..machine.clone() };
+    let machine = Machine {
+        gravity_m_s2: q * machine.gravity_m_s2,
+        joints: legs.joints(&machine.home),
+        ..machine.clone()
+    };
     let Motion { pose, twist, acceleration } = motion;
     let motion = Motion {
         pose: Pose { rotation: q * pose.rotation, position: q * pose.position + d },
@@ -57,7 +60,12 @@ fn rescaled(machine: &Machine, motion: &Motion, s: f64, m: f64, t: f64) -> (Mach
     result.platform.center_of_mass_m *= s;
     result.platform.inertia *= m * s * s;
     for link in [&mut result.cylinder, &mut result.rod] {
-        let Link { mass_kg: mass, center_of_mass_m: center_of_mass, axial_inertia_kg_m2: axial_inertia, transverse_inertia } = link;
+        let Link {
+            mass_kg: mass,
+            center_of_mass_m: center_of_mass,
+            axial_inertia_kg_m2: axial_inertia,
+            transverse_inertia,
+        } = link;
         *mass *= m;
         *center_of_mass *= s;
         *axial_inertia *= m * s * s;

@@ -45,7 +45,11 @@ pub fn reason(output: &Output) -> (State, DiagnosticCode) {
 /// From home to a distance in a time, and back from an instant on.
 pub fn there_and_back(t: f64, time_s: f64, distance: f64, back_s: f64) -> TaskState {
     let (up, down) = (rise(t, time_s), rise(t - back_s, time_s));
-    let s = Profile { value_share: up.value_share - down.value_share, rate_per_s: up.rate_per_s - down.rate_per_s, accel_per_s2: up.accel_per_s2 - down.accel_per_s2 };
+    let s = Profile {
+        value_share: up.value_share - down.value_share,
+        rate_per_s: up.rate_per_s - down.rate_per_s,
+        accel_per_s2: up.accel_per_s2 - down.accel_per_s2,
+    };
     on_the_way(distance, &s)
 }
 

@@ -7,7 +7,13 @@ use super::*;
 
 /// Half of the delay is not known to the estimator.
 fn sampled_loop(damping_ratio: f64, delay: f64) -> SampledLoop {
-    SampledLoop { wn_t: f64::NAN, damping_ratio, known_delay_periods: 0.5 * delay, delay_periods: delay, ..SampledLoop::default() }
+    SampledLoop {
+        wn_t: f64::NAN,
+        damping_ratio,
+        known_delay_periods: 0.5 * delay,
+        delay_periods: delay,
+        ..SampledLoop::default()
+    }
 }
 
 const DELAYS: [f64; 4] = [0.0, 0.6, 2.0, 3.3];

@@ -18,7 +18,8 @@ pub fn drawn(file: &Machine, random: &mut Random) -> Machine {
     actuator.reflected_mass_kg = (actuator.reflected_mass_kg + 0.01 * file.platform.mass_kg) * off(0.3);
     let most = actuator.max_force_n;
     actuator.coulomb_friction_n = core::array::from_fn(|_| 0.008 * most * off(0.5));
-    actuator.viscous_friction_n_s_m = core::array::from_fn(|_| 0.02 * most / actuator.max_rate_m_s * off(0.5));
+    actuator.viscous_friction_n_s_m =
+        core::array::from_fn(|_| 0.02 * most / actuator.max_rate_m_s * off(0.5));
     actuator.load_friction_share = core::array::from_fn(|_| 0.015 * off(0.9));
     actuator.force_scale = core::array::from_fn(|_| off(0.05));
     machine

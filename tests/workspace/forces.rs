@@ -16,8 +16,10 @@ fn by_force(machine: &Machine, pose: Pose, effort: AccelerationDemand) -> f64 {
     let forces = (0..DIRECTIONS).map(|k| {
         let [angular, linear] = directions(k);
         let [turning, moving] = directions(k + DIRECTIONS);
-        let twist = Twist { angular: turning * CREEPING / machine.joints.radius_m, linear: moving * CREEPING };
-        let acceleration = Acceleration { angular: angular * effort.angular_rad_s2, linear: linear * effort.linear_m_s2 };
+        let twist =
+            Twist { angular: turning * CREEPING / machine.joints.radius_m, linear: moving * CREEPING };
+        let acceleration =
+            Acceleration { angular: angular * effort.angular_rad_s2, linear: linear * effort.linear_m_s2 };
         largest(&model.forces::<Exact>(&Motion { pose, twist, acceleration }).unwrap())
     });
     forces.fold(0.0, f64::max)
@@ -96,7 +98,8 @@ fn what_weighs_nothing_has_no_limit_and_what_is_too_much_carries_nothing() {
 #[test]
 fn reach_ends_with_the_stroke_and_at_singular_poses() {
     let machine = machine("motion_base");
-    let workspace = PoseEvaluator::new(&machine, AccelerationDemand { linear_m_s2: 1.0, angular_rad_s2: 1.0 });
+    let workspace =
+        PoseEvaluator::new(&machine, AccelerationDemand { linear_m_s2: 1.0, angular_rad_s2: 1.0 });
     let at = |z: f64| {
         let [alpha, beta, gamma, x, y, _] = machine.home;
         workspace.quality(&TaskState::at_rest([alpha, beta, gamma, x, y, z]).motion().pose)

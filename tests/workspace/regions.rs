@@ -170,7 +170,8 @@ fn sharpest(names: &[&str], cells: u32, reach: f64, poses: u32) -> (u32, f64) {
     for name in names {
         let machine = &if *name == "reference" { deployed(name).machine } else { machine(name) };
         let radius = machine.joints.radius_m;
-        let shapes = [RegionShape::Ball { turn_rad: 1.0 }, RegionShape::Box { low: [-1.0; 6], high: [1.0; 6] }];
+        let shapes =
+            [RegionShape::Ball { turn_rad: 1.0 }, RegionShape::Box { low: [-1.0; 6], high: [1.0; 6] }];
         for (k, shape) in (0..cells).flat_map(|k| shapes.iter().map(move |shape| (k, shape))) {
             let scales = [0.3, 0.3, 0.3, 0.2 * radius, 0.2 * radius, 0.2 * radius];
             let (place, size) = (numbers(k), numbers(k + cells));

@@ -50,7 +50,8 @@ const STROKE_TOLERANCE_M: f64 = 0.005;
 /// Lengths outside of the stroke, in words.
 pub fn lengths_outside(lengths_m: [Option<f64>; LEGS], machine: &Config) -> Vec<String> {
     let actuator = &machine.machine.actuator;
-    let (low, high) = (actuator.min_length_m - STROKE_TOLERANCE_M, actuator.max_length_m + STROKE_TOLERANCE_M);
+    let (low, high) =
+        (actuator.min_length_m - STROKE_TOLERANCE_M, actuator.max_length_m + STROKE_TOLERANCE_M);
     let found = (1..).zip(lengths_m).filter_map(|(number, length_m)| {
         let length_m = length_m.filter(|length_m| !(low..=high).contains(length_m))?;
         let (low, high) = (actuator.min_length_m, actuator.max_length_m);

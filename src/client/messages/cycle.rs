@@ -199,7 +199,9 @@ impl CycleMessage {
         (self.force_n, self.wrench_error) = (output.command_n, output.wrench_error.vector().into());
         (self.missed_measurements, self.missed_setpoints) =
             (output.missed_measurements, output.missed_setpoints);
-        if let Some(PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity }) = &output.platform {
+        if let Some(PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity }) =
+            &output.platform
+        {
             self.has_platform = 1;
             (self.rotation, self.position_m) = pose_numbers(pose);
             self.twist = twist.vector().into();

@@ -76,7 +76,11 @@ mod tests {
             (u64::MAX, SetpointKind::Unknown),
         ] {
             let setpoint = Setpoint::from(&message(number));
-            assert_eq!((setpoint.kind, setpoint.time_ns, setpoint.target_speed_share), (kind, 77, 0.5), "{number}");
+            assert_eq!(
+                (setpoint.kind, setpoint.time_ns, setpoint.target_speed_share),
+                (kind, 77, 0.5),
+                "{number}"
+            );
             let TaskState { x, xd, xdd } = setpoint.task;
             let numbers: Vec<f64> = x.iter().chain(&xd).chain(&xdd).copied().collect();
             assert_eq!(numbers, (1..=18).map(f64::from).collect::<Vec<_>>());

@@ -130,8 +130,11 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
 fn prismatic_joint(machine: &Machine, leg: &LegLayout) -> String {
     let (LegLayout { number: i, length, .. }, actuator) = (leg, &machine.actuator);
     let [shortest, longest] = [actuator.min_length_m, actuator.max_length_m];
-    let [reflected, viscous, coulomb] =
-        [actuator.reflected_mass_kg, leg.of(&actuator.viscous_friction_n_s_m), leg.of(&actuator.coulomb_friction_n)];
+    let [reflected, viscous, coulomb] = [
+        actuator.reflected_mass_kg,
+        leg.of(&actuator.viscous_friction_n_s_m),
+        leg.of(&actuator.coulomb_friction_n),
+    ];
     format!(
         "<joint name=\"prismatic_{i}\" type=\"slide\" axis=\"0 0 1\" ref=\"{length:?}\" \
          range=\"{shortest:?} {longest:?}\" armature=\"{reflected:?}\" \

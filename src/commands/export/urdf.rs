@@ -92,8 +92,11 @@ fn leg_links(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
             &link_inertia(cylinder, *length)
         ),
         cylinder_visual = visual(0.5 * to, shapes.cylinder_radius, to, "cylinder"),
-        rod_inertial =
-            inertial(rod.mass_kg, &Vector3::new(0.0, 0.0, -rod.center_of_mass_m), &link_inertia(rod, *length)),
+        rod_inertial = inertial(
+            rod.mass_kg,
+            &Vector3::new(0.0, 0.0, -rod.center_of_mass_m),
+            &link_inertia(rod, *length)
+        ),
         rod_visual = visual(-0.5 * to, shapes.rod_radius, to, "rod"),
         at_base = origin(base, rotation),
         first_axis = Numbers(first_axis.as_slice()),

@@ -96,7 +96,12 @@ fn unstated_friction(found: &Identification) -> f64 {
     let home = TaskState::at_rest(machine.home).motion();
     let held = inverse_dynamics::<Gravity>(machine, &home).unwrap_or_default();
     let actuator = &machine.actuator;
-    let legs = actuator.coulomb_friction_n.iter().zip(&actuator.load_friction_share).zip(held).zip(&found.residual_n);
+    let legs = actuator
+        .coulomb_friction_n
+        .iter()
+        .zip(&actuator.load_friction_share)
+        .zip(held)
+        .zip(&found.residual_n);
     let rest = legs.map(|(((coulomb, load), held), residual)| {
         STICTION_RATIO * (coulomb + load * held.abs()) + RESIDUALS * residual
     });

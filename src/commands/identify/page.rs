@@ -153,7 +153,8 @@ impl Level {
         let mut columns = core::array::from_fn(|_| vec![f32::NAN; count]);
         for (before, after) in predictions(file, run).iter().zip(predictions(identified, run)) {
             let index = ((before.time_s - first_s) / step) as usize;
-            let forces = [before.command_n, before.command_n - before.residual_n, after.command_n - after.residual_n];
+            let forces =
+                [before.command_n, before.command_n - before.residual_n, after.command_n - after.residual_n];
             let leg = before.leg;
             let of_leg = forces.into_iter().enumerate().map(|(k, force)| (3 * leg + k, force));
             let residuals = [(3 * LEGS + leg, before.residual_n), (4 * LEGS + leg, after.residual_n)];

@@ -249,7 +249,8 @@ mod tests {
             let Motion { pose, twist, .. } = motion(time_ns);
             let legs = leg_motion(&config.machine, &motion(time_ns));
             let (length, rate) = (legs.length_m, Some(legs.rate_m_s));
-            let measurement = Some(Measurement { time_ns, length_m: length, rate_m_s: rate, ..Measurement::default() });
+            let measurement =
+                Some(Measurement { time_ns, length_m: length, rate_m_s: rate, ..Measurement::default() });
             let platform =
                 Some(PlatformState { pose, twist, condition: 1.0, time_to_singularity_s: f64::INFINITY });
             let reference = Some(motion(release_ns + instants.reference_ns));

@@ -72,7 +72,8 @@ impl Constants {
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
         let NoiseModel { bandwidth_rad_s, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth_rad_s, period_s, rate_noise_ratio: None };
-        let Law { mode, leg_masses, max_compensated_acceleration: max_compensated_disturbance, .. } = &parameters.law;
+        let Law { mode, leg_masses, max_compensated_acceleration: max_compensated_disturbance, .. } =
+            &parameters.law;
         let acceleration_by_command = InputMatrix::at_home(machine, *mode, leg_masses, parameters.fidelity);
         let disturbance =
             acceleration_by_command.largest_compensable_disturbance(max_compensated_disturbance);

@@ -99,7 +99,9 @@ impl Parameters {
     /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided
     /// by `wn = sqrt(Kp)`, so that it compares with a pose error.
     pub fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
-        let Self { law, engage_position_m: engage_position, engage_orientation_rad: engage_orientation, .. } = self;
+        let Self {
+            law, engage_position_m: engage_position, engage_orientation_rad: engage_orientation, ..
+        } = self;
         let PoseError { pose, twist } = error;
         largest_ratio([
             pose.linear.norm() / engage_position,

@@ -152,7 +152,12 @@ impl<'a, S: Simd> Factorization<'a, S> {
 
     /// Returns `Gamma + axial_n` with `N Gamma = W`, in lanes; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial_n: f64x8<S>) -> Option<LegLanes> {
+    pub fn forces(
+        &self,
+        legs: &LegGeometry<S>,
+        wrench: &LaneWrench<S>,
+        axial_n: f64x8<S>,
+    ) -> Option<LegLanes> {
         let simd = self.simd;
         let triples = &self.joints.triples;
         if !self.uses_blocks {

@@ -137,7 +137,12 @@ impl ForceChangeBounds {
 
     /// Changes of the forces under accelerations, and forces of velocities.
     pub fn moving(&self, motion: &LargestMotion, turn_rad: f64, turned_leg: f64) -> ForceBound {
-        let LargestMotion { angular_rad_s2: angular, linear_m_s2: linear, angular_velocity_rad_s: angular_velocity, velocity_m_s: velocity } = *motion;
+        let LargestMotion {
+            angular_rad_s2: angular,
+            linear_m_s2: linear,
+            angular_velocity_rad_s: angular_velocity,
+            velocity_m_s: velocity,
+        } = *motion;
         let turning = angular_velocity * angular_velocity;
         let joint_acceleration = linear + self.arm_m * angular;
         let joint_speed = velocity + self.arm_m * angular_velocity;
@@ -161,7 +166,10 @@ impl ForceChangeBounds {
         let ([weight, by_linear, by_angular], of_velocity) = (self.whole, self.moving(motion, 0.0, 0.0));
         let joint_acceleration = motion.linear_m_s2 + self.arm_m * motion.angular_rad_s2;
         ForceBound {
-            wrench: weight + by_linear * motion.linear_m_s2 + by_angular * motion.angular_rad_s2 + of_velocity.wrench,
+            wrench: weight
+                + by_linear * motion.linear_m_s2
+                + by_angular * motion.angular_rad_s2
+                + of_velocity.wrench,
             axial_n: self.axial_mass * joint_acceleration
                 + self.axial_weight
                 + self.coulomb_friction
@@ -171,7 +179,9 @@ impl ForceChangeBounds {
 
     /// Bound on the norm of the six forces along the legs.
     pub fn axial_norm(&self, motion: &LargestMotion) -> f64 {
-        SQRT_LEGS * (self.axial_mass * (motion.linear_m_s2 + self.arm_m * motion.angular_rad_s2) + self.axial_weight)
+        SQRT_LEGS
+            * (self.axial_mass * (motion.linear_m_s2 + self.arm_m * motion.angular_rad_s2)
+                + self.axial_weight)
     }
 }
 

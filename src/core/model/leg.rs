@@ -75,10 +75,12 @@ pub(super) struct LegConstants {
 impl LegConstants {
     pub fn new(machine: &Machine) -> Self {
         let (cylinder, rod) = (&machine.cylinder, &machine.rod);
-        let (m1, e1, m2, e2) = (cylinder.mass_kg, cylinder.center_of_mass_m, rod.mass_kg, rod.center_of_mass_m);
+        let (m1, e1, m2, e2) =
+            (cylinder.mass_kg, cylinder.center_of_mass_m, rod.mass_kg, rod.center_of_mass_m);
         let (it1, it2) = (&cylinder.transverse_inertia, &rod.transverse_inertia);
         let legs = Triples::uniform;
-        let linear = m2 * e2 + it1.quadratic_kg * it1.reference_length_m + it2.quadratic_kg * it2.reference_length_m;
+        let linear =
+            m2 * e2 + it1.quadratic_kg * it1.reference_length_m + it2.quadratic_kg * it2.reference_length_m;
         let constant = m1 * e1 * e1
             + m2 * e2 * e2
             + it1.constant_kg_m2

@@ -60,7 +60,12 @@ impl InverseDynamics {
     /// beyond the shorter slice are left as they are.
     ///
     /// [`InverseDynamics::forces_of`] differs by rounding.
-    pub fn forces_of_all(&self, fidelity: Fidelity, motions: &[Motion], forces_n: &mut [Option<[f64; LEGS]>]) {
+    pub fn forces_of_all(
+        &self,
+        fidelity: Fidelity,
+        motions: &[Motion],
+        forces_n: &mut [Option<[f64; LEGS]>],
+    ) {
         with_terms!(fidelity, M => self.write_forces::<M>(motions, forces_n));
     }
 

@@ -67,7 +67,11 @@ pub fn rise(t_s: f64, duration_s: f64) -> Profile {
 /// Rises during the first `fade_s` seconds, is 1, and falls during the last `fade_s` seconds before `end_s`.
 pub fn window(t_s: f64, end_s: f64, fade_s: f64) -> Profile {
     let (up, down) = (rise(t_s, fade_s), rise(t_s - (end_s - fade_s), fade_s));
-    Profile { value_share: up.value_share - down.value_share, rate_per_s: up.rate_per_s - down.rate_per_s, accel_per_s2: up.accel_per_s2 - down.accel_per_s2 }
+    Profile {
+        value_share: up.value_share - down.value_share,
+        rate_per_s: up.rate_per_s - down.rate_per_s,
+        accel_per_s2: up.accel_per_s2 - down.accel_per_s2,
+    }
 }
 
 /// The straight move in task coordinates along this profile.
@@ -100,7 +104,10 @@ mod tests {
         }
         assert_eq!(window(0.0, 3.0, 0.8), Profile::default());
         let end = window(3.0, 3.0, 0.8);
-        assert!(end.value_share.abs() < 1e-15 && end.rate_per_s.abs() < 1e-12 && end.accel_per_s2.abs() < 1e-12, "{end:?}");
+        assert!(
+            end.value_share.abs() < 1e-15 && end.rate_per_s.abs() < 1e-12 && end.accel_per_s2.abs() < 1e-12,
+            "{end:?}"
+        );
         assert_eq!(rise(0.5, 1.0).rate_per_s, PEAK_RATE_RATIO);
         let strongest = (0..=1000).map(|k| rise(f64::from(k) / 1000.0, 1.0).accel_per_s2).fold(0.0, f64::max);
         assert!((strongest - PEAK_ACCEL).abs() < 1e-4);
@@ -112,7 +119,8 @@ mod tests {
         let way = 0.3;
         for limits in [[0.1, 1e9, 1e9], [1e9, 0.1, 1e9], [1e9, 1e9, 0.1]] {
             let t = shortest_duration(way, limits);
-            let peaks = [PEAK_RATE_RATIO * way / t, PEAK_ACCEL * way / (t * t), PEAK_JERK * way / (t * t * t)];
+            let peaks =
+                [PEAK_RATE_RATIO * way / t, PEAK_ACCEL * way / (t * t), PEAK_JERK * way / (t * t * t)];
             let share = peaks.iter().zip(limits).map(|(peak, limit)| peak / limit).fold(0.0, f64::max);
             assert!((share - 1.0).abs() < 1e-12, "{share}");
         }

@@ -140,7 +140,8 @@ impl ElasticLeg {
 
     /// How far a drive is pressed beyond the leg's length at rest under this force \[m\].
     pub fn deflection(&self, force_n: f64) -> f64 {
-        force_n / self.stiffness_n_per_m + if force_n == 0.0 { 0.0 } else { (0.5 * self.backlash_m).copysign(force_n) }
+        force_n / self.stiffness_n_per_m
+            + if force_n == 0.0 { 0.0 } else { (0.5 * self.backlash_m).copysign(force_n) }
     }
 }
 
@@ -155,7 +156,12 @@ impl ExternalWrench {
 
 impl Default for Friction {
     fn default() -> Self {
-        Self { viscous_n_s_m: 0.0, coulomb_n: 0.0, stiction_n: 0.0, stribeck_speed_m_s: Self::STRIBECK_SPEED_M_S }
+        Self {
+            viscous_n_s_m: 0.0,
+            coulomb_n: 0.0,
+            stiction_n: 0.0,
+            stribeck_speed_m_s: Self::STRIBECK_SPEED_M_S,
+        }
     }
 }
 

@@ -85,7 +85,10 @@ pub fn integrate(
     let slope = Slope {
         pose: Twist { angular: mean(|k| k.pose.angular), linear: mean(|k| k.pose.linear) },
         twist: Acceleration { angular: mean(|k| k.twist.angular), linear: mean(|k| k.twist.linear) },
-        drives: DriveStates { length_m: of_drives(|k| k.drives.length_m), rate_m_s: of_drives(|k| k.drives.rate_m_s) },
+        drives: DriveStates {
+            length_m: of_drives(|k| k.drives.length_m),
+            rate_m_s: of_drives(|k| k.drives.rate_m_s),
+        },
     };
     Some(advanced(start, &slope, step_s))
 }

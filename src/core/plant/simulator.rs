@@ -185,8 +185,8 @@ impl Simulator {
         }
         let before = self.state().pose;
         let twist = twist_from_rates(self.machine(), &before, rates_m_s).unwrap_or_default();
-        let pose =
-            before.displaced(&Twist { angular: twist.angular * duration_s, linear: twist.linear * duration_s });
+        let pose = before
+            .displaced(&Twist { angular: twist.angular * duration_s, linear: twist.linear * duration_s });
         self.carry_drives(BodyState { pose, twist: Twist::default() });
     }
 
@@ -231,8 +231,11 @@ impl Simulator {
         let standing = !(elapsed < duration);
         let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
         self.carry_drives(BodyState { pose, twist });
-        self.brakes =
-            if standing { Brakes::Closed } else { Brakes::Closing { rates_m_s: *rates, elapsed_s: elapsed, duration_s: duration } };
+        self.brakes = if standing {
+            Brakes::Closed
+        } else {
+            Brakes::Closing { rates_m_s: *rates, elapsed_s: elapsed, duration_s: duration }
+        };
     }
 
     /// Moves the platform; drives keep their distance from the legs.

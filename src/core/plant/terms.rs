@@ -69,7 +69,8 @@ impl PlantTerms {
             step = step.min((divisor * tolerance_m / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
         };
 
-        let deflection = |spring: &ElasticLeg| actuator.max_force_n / spring.stiffness_n_per_m + 0.5 * spring.backlash_m;
+        let deflection =
+            |spring: &ElasticLeg| actuator.max_force_n / spring.stiffness_n_per_m + 0.5 * spring.backlash_m;
         let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance_m);
         let mut friction = [wanted.friction; LEGS];
         let mut moved = leg_mass;

@@ -113,7 +113,8 @@ fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u6
     if age_ns > max_force_age_ns && output.state.has_control() {
         let [age_s, bound_s] = [age_ns, max_force_age_ns].map(|time_ns| time_ns as f64 * 1e-9);
         let diagnostic = Diagnostic::new(DiagnosticCode::DaemonHeld, age_s, bound_s);
-        (output.state, output.diagnostic, output.command_n) = (State::Fault, diagnostic, Output::default().command_n);
+        (output.state, output.diagnostic, output.command_n) =
+            (State::Fault, diagnostic, Output::default().command_n);
     }
 }
 

@@ -111,7 +111,8 @@ impl FidelityComparison {
     /// The first part is the inside.
     fn new(parts: &[ErrorStatistics], all: ErrorStatistics) -> Self {
         let inside = parts.first().copied().unwrap_or_default();
-        let nothing = FidelityError { fidelity: Fidelity::Exact, mean_n: 0.0, rms_n: 0.0, max_n: 0.0, share: 0.0 };
+        let nothing =
+            FidelityError { fidelity: Fidelity::Exact, mean_n: 0.0, rms_n: 0.0, max_n: 0.0, share: 0.0 };
         let mut errors = [nothing; FIDELITY_COUNT];
         for (number, (error, fidelity)) in errors.iter_mut().zip(Fidelity::ALL).enumerate() {
             let errors =

@@ -112,7 +112,8 @@ impl ErrorStatistics {
         self.singular += other.singular;
         self.peak_n = self.peak_n.max(other.peak_n);
         for (a, b) in self.errors.iter_mut().zip(&other.errors) {
-            *a = ErrorSums { sum: a.sum + b.sum, squares: a.squares + b.squares, max_n: a.max_n.max(b.max_n) };
+            *a =
+                ErrorSums { sum: a.sum + b.sum, squares: a.squares + b.squares, max_n: a.max_n.max(b.max_n) };
         }
         self
     }

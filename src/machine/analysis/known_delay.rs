@@ -41,7 +41,14 @@ impl SampledLoop {
         let rate_noise = self.rate_noise_ratio.map(|noise| noise * periods);
         let wn_t = self.wn_t * periods;
         let held_pole = self.held_pole_t * periods;
-        let late = Self { wn_t, rate_noise_ratio: rate_noise, held_pole_t: held_pole, known_delay_periods: known_delay, delay_periods: known_delay + unknown, ..*self };
+        let late = Self {
+            wn_t,
+            rate_noise_ratio: rate_noise,
+            held_pole_t: held_pole,
+            known_delay_periods: known_delay,
+            delay_periods: known_delay + unknown,
+            ..*self
+        };
         masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))
     }
 

@@ -136,8 +136,9 @@ impl PoseEvaluator {
         let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
         let arm = pose.rotation * machine.platform.center_of_mass_m;
         let tilde = arm.cross_matrix();
-        let weight =
-            Vector6::from_iterator(arm.cross(&machine.gravity_m_s2).iter().chain(&machine.gravity_m_s2).copied());
+        let weight = Vector6::from_iterator(
+            arm.cross(&machine.gravity_m_s2).iter().chain(&machine.gravity_m_s2).copied(),
+        );
         let mut mass = Matrix6::zeros();
         for (row, column, block) in
             [(0, 0, -tilde * tilde), (0, 3, tilde), (3, 0, -tilde), (3, 3, Matrix3::identity())]

@@ -74,7 +74,11 @@ mod tests {
         let exact = |t: f64| {
             let profile = rise(t, 2.0);
             let way = Vector6::new(0.1, -0.2, 0.3, 1.0, -2.0, 0.5);
-            TaskState { x: way * profile.value_share, xd: way * profile.rate_per_s, xdd: way * profile.accel_per_s2 }
+            TaskState {
+                x: way * profile.value_share,
+                xd: way * profile.rate_per_s,
+                xdd: way * profile.accel_per_s2,
+            }
         };
         let mut knots = [0.0, 0.1, 0.7, 0.75, 1.2, 1.9, 2.0]
             .map(|t| Knot { t_s: t, state: TaskState::at_rest(exact(t).x.into()) });

@@ -99,7 +99,14 @@ pub(super) fn bounded_age_s(
 
 /// Whether the values from which the loop follows were all accepted.
 fn is_finite(sampled: &SampledLoop) -> bool {
-    let SampledLoop { wn_t, damping_ratio, estimator_ratio, delay_periods: delay, held_pole_t: held_pole, .. } = *sampled;
+    let SampledLoop {
+        wn_t,
+        damping_ratio,
+        estimator_ratio,
+        delay_periods: delay,
+        held_pole_t: held_pole,
+        ..
+    } = *sampled;
     let values = [wn_t, damping_ratio, estimator_ratio, delay, held_pole];
     values.iter().all(|value| value.is_finite())
 }

@@ -75,8 +75,17 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
         &of_leg(|leg| leg.universal_axis),
         &TaskState::at_rest(home_pose).motion().pose,
     );
-    let mut machine =
-        Machine { gravity_m_s2: gravity, platform, joints, cylinder, rod, actuator, home: home_pose, max_rotation_rad: max_rotation, level };
+    let mut machine = Machine {
+        gravity_m_s2: gravity,
+        platform,
+        joints,
+        cylinder,
+        rod,
+        actuator,
+        home: home_pose,
+        max_rotation_rad: max_rotation,
+        level,
+    };
     if !is_friction_stated {
         machine.actuator.friction_uncertainty_n = usual_friction_uncertainty(&machine);
     }
@@ -187,7 +196,11 @@ fn transverse_inertia(section: &mut SectionReader) -> TransverseInertia {
 
 /// Least transverse inertia of a link over the stroke; NaN if a value that it depends on was rejected.
 fn least_over_stroke(inertia: &TransverseInertia, actuator: &Actuator) -> f64 {
-    let TransverseInertia { constant_kg_m2: constant, quadratic_kg: quadratic, reference_length_m: reference_length } = *inertia;
+    let TransverseInertia {
+        constant_kg_m2: constant,
+        quadratic_kg: quadratic,
+        reference_length_m: reference_length,
+    } = *inertia;
     let (shortest, longest) = (actuator.min_length_m, actuator.max_length_m);
     if quadratic == 0.0 {
         return constant;

@@ -143,9 +143,15 @@ pub const FAILURES: &[Failure] = &[
     sensor("one length jumps by 0.1 mm", |m, _| m.length_m[LEG] += 1e-4),
     sensor("one length drifts by 1 mm/s", |m, c| m.length_m[LEG] += 1e-3 * c.since_s),
     sensor("one length drifts by 10 mm/s", |m, c| m.length_m[LEG] += 1e-2 * c.since_s),
-    sensor("one scale 1 % too large", |m, c| m.length_m[LEG] += 0.01 * (m.length_m[LEG] - c.first.length_m[LEG])),
-    sensor("one scale 10 % too large", |m, c| m.length_m[LEG] += 0.1 * (m.length_m[LEG] - c.first.length_m[LEG])),
-    sensor("one length counts backwards", |m, c| m.length_m[LEG] = 2.0 * c.first.length_m[LEG] - m.length_m[LEG]),
+    sensor("one scale 1 % too large", |m, c| {
+        m.length_m[LEG] += 0.01 * (m.length_m[LEG] - c.first.length_m[LEG])
+    }),
+    sensor("one scale 10 % too large", |m, c| {
+        m.length_m[LEG] += 0.1 * (m.length_m[LEG] - c.first.length_m[LEG])
+    }),
+    sensor("one length counts backwards", |m, c| {
+        m.length_m[LEG] = 2.0 * c.first.length_m[LEG] - m.length_m[LEG]
+    }),
     ("two lengths exchanged", Part::Exchanged(Exchange::Lengths, [LEG, LEG + 1])),
     ("two legs exchanged, lengths and drives", Part::Exchanged(Exchange::LengthsAndDrives, [LEG, LEG + 1])),
     ("two legs exchanged, external pose", Part::Exchanged(Exchange::WithExternalPose, [LEG, LEG + 1])),

@@ -53,7 +53,8 @@ fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -
             reference: Some(motion),
             ..Output::default()
         };
-        let measurement = Some(Measurement { time_ns: release_ns, length_m: length, ..Measurement::default() });
+        let measurement =
+            Some(Measurement { time_ns: release_ns, length_m: length, ..Measurement::default() });
         let input = Input { release_ns, measurement, ..Input::default() };
         let cycle = CycleMessage { cycle: number, due_ns: release_ns, ..CycleMessage::new(&input, &output) };
         file.write_cycle(&cycle).unwrap();

@@ -255,12 +255,21 @@ impl Recorder {
             let task =
                 if self.kind == SetpointKind::Motion { task } else { TaskState::at_rest(task.x.into()) };
             let target_speed = self.target_speed;
-            Setpoint { kind: self.kind, target_speed_share: target_speed, ..Setpoint::motion(self.now_ns, task) }
+            Setpoint {
+                kind: self.kind,
+                target_speed_share: target_speed,
+                ..Setpoint::motion(self.now_ns, task)
+            }
         });
         Input {
             release_ns: self.now_ns + self.phase_ns,
             setpoint: setpoint.or(last.setpoint),
-            measurement: Some(Measurement { time_ns: self.now_ns, length_m: length, rate_m_s: rate, ..Measurement::default() }),
+            measurement: Some(Measurement {
+                time_ns: self.now_ns,
+                length_m: length,
+                rate_m_s: rate,
+                ..Measurement::default()
+            }),
             request: self.asked,
             ..Input::default()
         }

@@ -177,7 +177,8 @@ impl Twin {
 /// control could do about it.
 fn is_carried_out(observed: &Rig) -> bool {
     let actuator = &observed.machine.actuator;
-    observed.force.is_none() && observed.measurement().length_m.iter().any(|length| !actuator.contains(*length))
+    observed.force.is_none()
+        && observed.measurement().length_m.iter().any(|length| !actuator.contains(*length))
 }
 
 /// Faults that ended control, but for the operator's and those of lost measurements.

@@ -109,7 +109,12 @@ impl Delayed {
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
-            measurement: Some(Measurement { time_ns, length_m: length, rate_m_s: Some(rate), ..Measurement::default() }),
+            measurement: Some(Measurement {
+                time_ns,
+                length_m: length,
+                rate_m_s: Some(rate),
+                ..Measurement::default()
+            }),
             request: Some(OperatorRequest {
                 request: Request::Engage,
                 message: MessageId { epoch: START_NS, sequence: 1 },
@@ -148,7 +153,8 @@ impl Delayed {
 fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let FidelityChoice::Fixed(fidelity) = config.deployment.control.fidelity else { panic!("not fixed") };
     let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
-    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise_ratio: rate_noise, .. } = setup.sampled;
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise_ratio: rate_noise, .. } =
+        setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);
     let law = Law::new(
@@ -167,8 +173,8 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             period_s: parameters.noise.period_s,
         },
         // What the estimator knows beside the age of the measurement.
-        force_delay_ns: ((setup.sampled.known_delay_periods - setup.age).max(0.0) * parameters.period_ns as f64)
-            as u64,
+        force_delay_ns: ((setup.sampled.known_delay_periods - setup.age).max(0.0)
+            * parameters.period_ns as f64) as u64,
         force_rate_n_s: UNLIMITED,
         // Disturbances are not faults here.
         payload_change_kg: Some(UNLIMITED),

@@ -89,7 +89,14 @@ impl Law {
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
         let Pair { angular: orientation, linear: position } = gains;
-        Self { mode, position, orientation, compensates_disturbance, leg_masses, max_compensated_acceleration: max_compensated_disturbance }
+        Self {
+            mode,
+            position,
+            orientation,
+            compensates_disturbance,
+            leg_masses,
+            max_compensated_acceleration: max_compensated_disturbance,
+        }
     }
 
     /// Largest acceleration of a leg that a mode without inertia leaves to feedback: the reference's largest
@@ -103,7 +110,9 @@ impl Law {
         if self.mode.includes_inertia() {
             return 0.0;
         }
-        limits.position.acceleration + arm_m * limits.orientation.acceleration + disturbance_acceleration.amax()
+        limits.position.acceleration
+            + arm_m * limits.orientation.acceleration
+            + disturbance_acceleration.amax()
     }
 
     /// Kp and Kd of the six errors.

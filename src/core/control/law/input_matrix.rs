@@ -103,7 +103,8 @@ impl InputMatrix {
 
     /// Acceleration that the law must command against a disturbance: `B^-1 d`.
     pub fn command(&self, disturbance_acceleration: &Vector6<f64>) -> Vector6<f64> {
-        self.matrix_and_inverse.map_or(*disturbance_acceleration, |[_, inverse]| inverse * disturbance_acceleration)
+        self.matrix_and_inverse
+            .map_or(*disturbance_acceleration, |[_, inverse]| inverse * disturbance_acceleration)
     }
 }
 

@@ -118,7 +118,8 @@ impl DisturbanceBounds {
         let ReadingErrors { deviation_m: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
         let has_weight = expects_forces && machine.gravity_m_s2.norm_squared() > 0.0;
-        let gravity_over_square = machine.gravity_m_s2 / machine.gravity_m_s2.norm_squared().max(f64::MIN_POSITIVE);
+        let gravity_over_square =
+            machine.gravity_m_s2 / machine.gravity_m_s2.norm_squared().max(f64::MIN_POSITIVE);
         let along_gravity =
             Vector6::new(0.0, 0.0, 0.0, gravity_over_square.x, gravity_over_square.y, gravity_over_square.z);
         let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
@@ -126,12 +127,15 @@ impl DisturbanceBounds {
         let friction = FrictionEffects {
             force_n: machine.actuator.friction_uncertainty_n,
             payload_kg_per_n: by_force.tr_mul(&payload_by_disturbance).into(),
-            acceleration_m_s2_per_n: core::array::from_fn(|leg| weighted(&by_force.column(leg).into(), arm_m).norm()),
+            acceleration_m_s2_per_n: core::array::from_fn(|leg| {
+                weighted(&by_force.column(leg).into(), arm_m).norm()
+            }),
             by_force,
             force_by_disturbance: by_force.try_inverse().unwrap_or_default(),
         };
         let sum = |effects: [f64; LEGS]| friction.force_n * effects.into_iter().map(f64::abs).sum::<f64>();
-        let of_one_leg = friction.force_n * friction.acceleration_m_s2_per_n.into_iter().fold(f64::INFINITY, f64::min);
+        let of_one_leg =
+            friction.force_n * friction.acceleration_m_s2_per_n.into_iter().fold(f64::INFINITY, f64::min);
         let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass_kg)
             .max(DEFAULT_PAYLOAD_CHANGE_PER_FRICTION * sum(friction.payload_kg_per_n));
         let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT

@@ -190,7 +190,8 @@ impl FrozenSensors {
             }
             let repeats = |most| f64::from(*equal + 1) > most;
             if errors.max_equal_readings().is_some_and(repeats) && result.is_ok() {
-                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution_m).at(leg));
+                result =
+                    Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution_m).at(leg));
             }
         }
         result
@@ -210,7 +211,12 @@ mod tests {
         [deviation, resolution]: [f64; 2],
         legs: [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
-        sensors.check(&length, &ReadingErrors { deviation_m: deviation, resolution_m: resolution }, &BOUNDS, || legs)
+        sensors.check(
+            &length,
+            &ReadingErrors { deviation_m: deviation, resolution_m: resolution },
+            &BOUNDS,
+            || legs,
+        )
     }
 
     /// Readings of a crawling leg that does not move while the feedback force on it grows to `newtons`.

@@ -318,7 +318,13 @@ impl ReferenceGenerator {
             step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
             let Self { strength, .. } = *self;
             let inner_speeds = inner_speeds(&begin, &self.motion, step_s);
-            let step = Step { from: Some(&begin.pose), duration_s: step_s, inner_speeds, effort, strength_share: strength };
+            let step = Step {
+                from: Some(&begin.pose),
+                duration_s: step_s,
+                inner_speeds,
+                effort,
+                strength_share: strength,
+            };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.proportional_steps_left = match verified {

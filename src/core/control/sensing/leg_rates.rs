@@ -28,7 +28,8 @@ impl LegRateEstimator {
     #[inline(never)]
     fn estimated(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
         let time_ns = measurement.time_ns;
-        let measured = ErrorCoordinates { value: Vector6::from(measurement.length_m), rate: Vector6::zeros() };
+        let measured =
+            ErrorCoordinates { value: Vector6::from(measurement.length_m), rate: Vector6::zeros() };
         let elapsed_s = |filter: &KalmanFilter| seconds_between(filter.time_ns, time_ns);
         let filter = match &mut self.filter {
             Some(filter) if (0.0..MAX_GAP_S).contains(&elapsed_s(filter)) => filter,

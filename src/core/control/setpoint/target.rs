@@ -39,7 +39,10 @@ impl<'a> Target<'a> {
         if setpoint.setpoint.kind == SetpointKind::Pose {
             Self::Samples(samples)
         } else if setpoint.setpoint.kind == SetpointKind::Target {
-            Self::Pose { pose: &setpoint.motion.pose, speed_share: share(setpoint.setpoint.target_speed_share) }
+            Self::Pose {
+                pose: &setpoint.motion.pose,
+                speed_share: share(setpoint.setpoint.target_speed_share),
+            }
         } else {
             Self::Motion(setpoint)
         }

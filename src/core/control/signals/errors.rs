@@ -43,7 +43,12 @@ pub struct ErrorCoordinates {
 
 impl ErrorCoordinates {
     /// Error of leg lengths and rates.
-    pub fn of_legs(machine: &Machine, desired: &Motion, length_m: &[f64; LEGS], rate_m_s: &[f64; LEGS]) -> Self {
+    pub fn of_legs(
+        machine: &Machine,
+        desired: &Motion,
+        length_m: &[f64; LEGS],
+        rate_m_s: &[f64; LEGS],
+    ) -> Self {
         let (desired, desired_rate) = leg_lengths_and_rates(machine, &desired.pose, &desired.twist);
         Self {
             value: Vector6::from(desired) - Vector6::from(*length_m),

@@ -221,8 +221,16 @@ fn check_following_error(
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
     let Some(PoseError { pose, twist }) = error else { return Ok(()) };
-    let Parameters { following_position_m: following_position, following_orientation_rad: following_orientation, .. } = parameters;
-    let Parameters { following_velocity_m_s: following_velocity, following_angular_velocity_rad_s: following_angular_velocity, .. } = parameters;
+    let Parameters {
+        following_position_m: following_position,
+        following_orientation_rad: following_orientation,
+        ..
+    } = parameters;
+    let Parameters {
+        following_velocity_m_s: following_velocity,
+        following_angular_velocity_rad_s: following_angular_velocity,
+        ..
+    } = parameters;
     let ratio =
         largest_ratio([pose.linear.norm() / following_position, pose.angular.norm() / following_orientation]);
     if !active.check(Limit::Following, ratio) {

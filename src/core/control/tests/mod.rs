@@ -73,7 +73,11 @@ pub(in crate::control) fn machine(samples: &mut RandomVectors) -> Machine {
         mass_kg: 10.0,
         center_of_mass_m: 0.4,
         axial_inertia_kg_m2: 0.1,
-        transverse_inertia: TransverseInertia { constant_kg_m2: 1.0, quadratic_kg: 0.0, reference_length_m: 0.0 },
+        transverse_inertia: TransverseInertia {
+            constant_kg_m2: 1.0,
+            quadratic_kg: 0.0,
+            reference_length_m: 0.0,
+        },
     };
     Machine {
         gravity_m_s2: Vector3::new(0.0, 0.0, -9.81),

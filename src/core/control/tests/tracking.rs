@@ -16,8 +16,12 @@ fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, 
     for (k, (time_ms, displacement)) in measured.iter().enumerate() {
         let pose = home.displaced(displacement);
         let length = leg_lengths(constants.machine(), &pose);
-        let measurement =
-            Measurement { time_ns: time_ms * MS, length_m: length, rate_m_s: Some([0.0; LEGS]), ..Measurement::default() };
+        let measurement = Measurement {
+            time_ns: time_ms * MS,
+            length_m: length,
+            rate_m_s: Some([0.0; LEGS]),
+            ..Measurement::default()
+        };
         let located = located(&measurement, pose, Twist::default());
         let cycle = Cycle { constants, release_ns: (k as u64 + 1) * MS, state: State::Active };
         (error, _) = tracker.update(&cycle, &reference, &Localization::new(constants), &located);

@@ -76,7 +76,10 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
     let legs: Vec<_> = samples.iter().map(|sample| leg_motion(machine, &sample.motion)).collect();
     let mut standing = [0.0; LEGS];
     for legs in &legs {
-        standing.iter_mut().zip(legs.rate_m_s).for_each(|(sum, rate)| *sum += rate * rate / samples.len() as f64);
+        standing
+            .iter_mut()
+            .zip(legs.rate_m_s)
+            .for_each(|(sum, rate)| *sum += rate * rate / samples.len() as f64);
     }
     let standing = standing.map(|square| STANDING_M_S.min(STANDING_RATIO * square.sqrt()));
     let known = load.parameters();

@@ -169,7 +169,11 @@ pub(super) fn examine(
     let legs = LOG_SCALE..LOG_SCALE + LEGS;
     let gauge = DVector::from_fn(ALL, |row, _| {
         let deviation = parameters.deviation.get(row).copied().unwrap_or_default();
-        if legs.contains(&row) && !is_scale_known { deviation / (LEGS as f64 * GAUGE_DEVIATION_RATIO) } else { 0.0 }
+        if legs.contains(&row) && !is_scale_known {
+            deviation / (LEGS as f64 * GAUGE_DEVIATION_RATIO)
+        } else {
+            0.0
+        }
     });
     let normal = (j.tr_mul(j) + DMatrix::identity(ALL, ALL) + &gauge * gauge.transpose()).cholesky()?;
     let prior = (parameters.prior - fit.free).component_div(&parameters.deviation).push(0.0);

@@ -206,7 +206,13 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
             run.samples.get(equation.first + GROUP / 2).map(|sample| leg_motion(machine, &sample.motion));
         let of_leg = |values: [f64; LEGS]| values.get(equation.leg).copied().unwrap_or_default();
         let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length_m), of_leg(legs.rate_m_s)]);
-        Prediction { leg: equation.leg, time_s: equation.time_s, motion, command_n: command, residual_n: residual }
+        Prediction {
+            leg: equation.leg,
+            time_s: equation.time_s,
+            motion,
+            command_n: command,
+            residual_n: residual,
+        }
     };
     equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
 }
@@ -252,7 +258,8 @@ pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LE
 /// stands.
 pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
     let mut errors = [(0.0, f64::NAN, 0_u32); LEGS];
-    for Prediction { leg, residual_n: residual, .. } in runs.iter().flat_map(|run| predictions(machine, run)) {
+    for Prediction { leg, residual_n: residual, .. } in runs.iter().flat_map(|run| predictions(machine, run))
+    {
         if let Some((squares, largest, count)) = errors.get_mut(leg) {
             (*squares, *largest, *count) =
                 (*squares + residual * residual, largest.max(residual.abs()), *count + 1);

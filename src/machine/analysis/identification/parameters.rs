@@ -89,7 +89,11 @@ impl Parameters {
         let guess = {
             let size = (PAYLOAD_SIZE * radius).powi(2);
             let mass = PAYLOAD_PER_PLATFORM * mass;
-            Platform { mass_kg: mass, center_of_mass_m: Vector3::zeros(), inertia: Matrix3::identity() * (mass * size) }
+            Platform {
+                mass_kg: mass,
+                center_of_mass_m: Vector3::zeros(),
+                inertia: Matrix3::identity() * (mass * size),
+            }
         };
         let mut prior = Free::zeros();
         prior.fixed_rows_mut::<BODY>(0).copy_from(&cholesky_parameters(&file.platform));
@@ -169,7 +173,8 @@ impl Parameters {
     pub fn unknowns(&self, free: &Free) -> Unknowns {
         let Bodies { machine, payload } = self.bodies(free);
         let actuator = &machine.actuator;
-        let loss = actuator.force_scale.iter().zip(&actuator.load_friction_share).map(|(scale, load)| scale * load);
+        let loss =
+            actuator.force_scale.iter().zip(&actuator.load_friction_share).map(|(scale, load)| scale * load);
         let mut unknowns = Unknowns::zeros();
         unknowns.fixed_rows_mut::<PARAMETER_COUNT>(0).copy_from(&inertial_parameters(&machine));
         unknowns.fixed_rows_mut::<LEGS>(SCALE).copy_from(&Vector6::from(actuator.force_scale));
@@ -192,10 +197,11 @@ fn scaled(link: &Link, mass: f64, logs: &Vector3<f64>, ends: [f64; 2]) -> Link {
     scaled.axial_inertia_kg_m2 *= along.exp();
     // Across, a link has at least half of its axial inertia at every length.
     let inertia = &link.transverse_inertia;
-    let least =
-        ends.map(|length| inertia.constant_kg_m2 + inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2));
-    let excess =
-        least.into_iter().chain([inertia.constant_kg_m2]).fold(f64::INFINITY, f64::min) - 0.5 * link.axial_inertia_kg_m2;
+    let least = ends.map(|length| {
+        inertia.constant_kg_m2 + inertia.quadratic_kg * (length - inertia.reference_length_m).powi(2)
+    });
+    let excess = least.into_iter().chain([inertia.constant_kg_m2]).fold(f64::INFINITY, f64::min)
+        - 0.5 * link.axial_inertia_kg_m2;
     scaled.transverse_inertia.constant_kg_m2 +=
         excess * (across.exp() - 1.0) + 0.5 * (scaled.axial_inertia_kg_m2 - link.axial_inertia_kg_m2);
     scaled

@@ -48,7 +48,10 @@ fn a_loop_beyond_its_margins_grows_and_within_them_fades() {
         let with = at_10_hz(30.0, 2.0);
         let gain = share * with.gain_margin();
         let light = SampledLoop { mass_ratio: 1.0 / gain, ..with };
-        let late = SampledLoop { delay_periods: with.delay_periods + share * (with.longest_delay() - with.delay_periods), ..with };
+        let late = SampledLoop {
+            delay_periods: with.delay_periods + share * (with.longest_delay() - with.delay_periods),
+            ..with
+        };
         [(light, share < 1.0), (late, share < 1.0)]
     }) {
         let response = each.response(0.0, 1e-3, 4000);

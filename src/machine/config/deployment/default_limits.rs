@@ -38,7 +38,8 @@ impl DefaultLimits {
         let actuator = &machine.actuator;
         let (_, holding) = drives.hardest_held();
         let available = actuator.available_force();
-        let usable = USABLE_FORCE_RATIO * available - actuator.largest_viscous_friction() * actuator.max_rate_m_s;
+        let usable =
+            USABLE_FORCE_RATIO * available - actuator.largest_viscous_friction() * actuator.max_rate_m_s;
         // Some acceleration remains even if holding and friction use nearly all force.
         let usable = usable.max(holding + LINEAR_SHARE * (available - holding));
         let for_linear = holding + LINEAR_SHARE * (usable - holding);

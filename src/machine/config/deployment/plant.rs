@@ -115,7 +115,11 @@ fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     if stiffness.is_none() && backlash > 0.0 {
         section.reject("backlash_m", "must be 0 without stiffness_n_m: the flanks of a backlash are springs");
     }
-    stiffness.map(|stiffness| ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: damping, backlash_m: backlash })
+    stiffness.map(|stiffness| ElasticLeg {
+        stiffness_n_per_m: stiffness,
+        damping_n_s_m: damping,
+        backlash_m: backlash,
+    })
 }
 
 fn sensor(mut section: SectionReader) -> SensorErrors {

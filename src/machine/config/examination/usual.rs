@@ -132,7 +132,12 @@ fn drive_ratios(examiner: &Examiner) -> Vec<Ratio> {
             "actuator.max_force_n at max_rate_m_s",
             0.003..=0.6,
         ),
-        ratio("actuator.coulomb_friction_n", largest(&actuator.coulomb_friction_n) / force, FORCE, 0.001..=0.4),
+        ratio(
+            "actuator.coulomb_friction_n",
+            largest(&actuator.coulomb_friction_n) / force,
+            FORCE,
+            0.001..=0.4,
+        ),
         ratio("actuator.friction_uncertainty_n", actuator.friction_uncertainty_n / force, FORCE, 0.001..=0.4),
     ]
 }

@@ -131,7 +131,13 @@ impl EstimatorConstants {
         max_compensated_acceleration: Vector6<f64>,
         max_plausible_acceleration_m_s2: f64,
     ) -> Self {
-        Self { noise, covariance: noise.steady().0, max_compensated_acceleration, reading_errors, max_plausible_acceleration_m_s2 }
+        Self {
+            noise,
+            covariance: noise.steady().0,
+            max_compensated_acceleration,
+            reading_errors,
+            max_plausible_acceleration_m_s2,
+        }
     }
 
     /// Largest plausible innovation of a leg, `dt_s` after the last measurement \[m\]: noise, plus the

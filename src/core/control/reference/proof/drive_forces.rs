@@ -60,7 +60,8 @@ impl ForceBounds {
         let is_beyond = holding > self.holding_n;
         if is_beyond {
             let moving = holding + (MAX_MOVING_SHARE - MAX_HOLDING_SHARE) * available;
-            *self = Self { holding_n: holding + START_FORCE_RATIO * available, moving_n: moving.min(available) };
+            *self =
+                Self { holding_n: holding + START_FORCE_RATIO * available, moving_n: moving.min(available) };
         }
         is_beyond
     }
@@ -254,7 +255,8 @@ impl ForceProof {
             ForceBound { wrench: at_rest.wrench + moving.wrench, axial_n: at_rest.axial_n + moving.axial_n };
         let axial_norm = changes.axial_norm(&motion);
         ball.largest_around(peaks, axial_norm, &change, distance) <= self.bounds.moving_n
-            && ball.largest_held(&center, changes, distance) <= self.bounds.holding_n + self.held_between_knots
+            && ball.largest_held(&center, changes, distance)
+                <= self.bounds.holding_n + self.held_between_knots
     }
 
     /// Whether the drives can hold the platform at a distance from the centre of a ball.

@@ -121,8 +121,11 @@ impl<'a> StopExamination<'a> {
         let (square, cube) = (duration * duration, duration * duration * duration);
         let length_share = CUBIC_DEPARTURE_RATIO * length_jerk_bound * cube / LENGTH_DEPARTURE_M;
         let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate_m_s;
-        let rate_share =
-            if needs_rates { CUBIC_RATE_DEPARTURE_RATIO * length_jerk_bound * square / max_departure } else { 0.0 };
+        let rate_share = if needs_rates {
+            CUBIC_RATE_DEPARTURE_RATIO * length_jerk_bound * square / max_departure
+        } else {
+            0.0
+        };
         let knots = Knots::new(duration, rate_share, length_share);
         let chord = step.duration_s * step.duration_s / 8.0;
         // The jerk is along the velocity u and, across it, along the remaining part of the acceleration's

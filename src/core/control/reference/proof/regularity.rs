@@ -89,8 +89,13 @@ impl Ball {
     /// pivots are needed: their effort is subtracted afterwards.
     pub fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
-        let Conditioning { sensitivity, largest_row_norm: largest_row, shortest_leg_m: shortest, universal_sine, is_pivoted } =
-            Conditioning::new(constants.machine(), center);
+        let Conditioning {
+            sensitivity,
+            largest_row_norm: largest_row,
+            shortest_leg_m: shortest,
+            universal_sine,
+            is_pivoted,
+        } = Conditioning::new(constants.machine(), center);
         if is_pivoted {
             *effort = effort.saturating_sub(PIVOTING_EFFORT);
         }

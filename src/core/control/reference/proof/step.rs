@@ -31,7 +31,11 @@ impl Default for Step<'_> {
 /// Largest norms of `v0 + a0 h / 4` and `v1 - a1 h / 4`, from the motions at both ends of a step and its duration h \[rad/s\],
 /// \[m/s\]. The velocity within the step is a quadratic Bezier curve: it stays in the polygon of these two and of the
 /// velocities at both ends.
-pub(in crate::control::reference) fn inner_speeds(begin: &Motion, end: &Motion, duration_s: f64) -> Pair<f64> {
+pub(in crate::control::reference) fn inner_speeds(
+    begin: &Motion,
+    end: &Motion,
+    duration_s: f64,
+) -> Pair<f64> {
     let quarter = 0.25 * duration_s;
     let largest = |a: Vector3<f64>, b: Vector3<f64>| a.norm_squared().max(b.norm_squared()).sqrt();
     Pair {

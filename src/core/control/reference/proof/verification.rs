@@ -109,7 +109,14 @@ fn has_room(
     let [_, beta, ..] = x;
     let c = libm::cos((beta.abs() + turn.distance_bound).min(core::f64::consts::FRAC_PI_2));
     let turned = turn.distance_bound / c + margin / constants.arm_m;
-    let needs = [turned, turned, turned, shift.distance_bound + margin, shift.distance_bound + margin, shift.distance_bound + margin];
+    let needs = [
+        turned,
+        turned,
+        turned,
+        shift.distance_bound + margin,
+        shift.distance_bound + margin,
+        shift.distance_bound + margin,
+    ];
     let Envelope { lowest, highest } = envelope;
     x.iter()
         .zip(needs)

@@ -166,7 +166,8 @@ impl Walls {
         let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
         let kept = WALL_RATIO * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
-        let LegMotion { length_m: length, rate_m_s: rate, accel_m_s2: accel } = leg_motion(machine, &without_acceleration);
+        let LegMotion { length_m: length, rate_m_s: rate, accel_m_s2: accel } =
+            leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
         let approach = Approach::of_bound(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let halves_s = half_durations(limits, led);

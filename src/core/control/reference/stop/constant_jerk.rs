@@ -13,7 +13,8 @@ pub(in crate::control::reference) fn step_constant_jerk(
     dt_s: f64,
 ) {
     let Motion { pose, twist, acceleration } = motion;
-    let shift = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| (v + (a * 2.0 + a1) * (dt_s / 6.0)) * dt_s;
+    let shift =
+        |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| (v + (a * 2.0 + a1) * (dt_s / 6.0)) * dt_s;
     let velocity = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| v + (a + a1) * (0.5 * dt_s);
     // Magnus expansion: the axis of rotation turns during the step.
     let commutator = twist.angular.cross(&acceleration.angular) * (dt_s * dt_s * dt_s / 12.0);

@@ -59,7 +59,11 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
         let [velocity, ahead, acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
         let at = |dt: f64| {
             let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
-            let target = TargetOffset { offset, target_velocity: velocity + acceleration * dt, target_acceleration: acceleration };
+            let target = TargetOffset {
+                offset,
+                target_velocity: velocity + acceleration * dt,
+                target_acceleration: acceleration,
+            };
             // The target of the other vector does not matter.
             let beside = TargetOffset { offset: 3.0 * offset, ..target };
             let both = Pair { angular: &ahead, linear: &ahead };

@@ -110,7 +110,8 @@ fn no_length_has_a_third_derivative_beyond_its_bound() {
         };
         // The shortest leg decides.
         let mut machine = scene.constants.machine().clone();
-        machine.actuator.min_length_m = leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
+        machine.actuator.min_length_m =
+            leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
         let constants = Constants::new(&machine, scene.constants.parameters);
         let bound = length_jerk_bound(&constants, v, w);
         let largest =

@@ -156,7 +156,8 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
     assert_eq!((nominal.shortest_m, nominal.longest_m), ([shortest; LEGS], [longest; LEGS]));
     let room = 2.5e-5 * machine.actuator.stroke();
     // Relaxed bounds keep two rooms from the end stops.
-    let (low, high) = (machine.actuator.min_length_m + 2.0 * room, machine.actuator.max_length_m - 2.0 * room);
+    let (low, high) =
+        (machine.actuator.min_length_m + 2.0 * room, machine.actuator.max_length_m - 2.0 * room);
     let stops = [low, f64::NEG_INFINITY, -high, f64::NEG_INFINITY];
     let ends = |bounds: &PoseBounds| {
         let envelope = bounds.envelope.unwrap();

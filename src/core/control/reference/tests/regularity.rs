@@ -95,7 +95,8 @@ fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
             is_covered(&mut RegularBalls::default(), &constants, &center, reach(size))
         });
         let sine = |pose: &Pose| universal_sine(&machine, pose);
-        let found = lowest(&mut samples, &center, reach(size), [1, 200], sine) / constants.least_universal_sine;
+        let found =
+            lowest(&mut samples, &center, reach(size), [1, 200], sine) / constants.least_universal_sine;
         assert!(found >= 1.0 - 1e-9, "{found}, {size}, {ratio:?}, {center:?}");
         if size > 0.0 {
             (closest, accepted) = (closest.min(found), accepted + 1);
