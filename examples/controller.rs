@@ -27,15 +27,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for now_ns in (1..3000).map(|cycle| cycle * parameters.period_ns) {
         let t = now_ns as f64 * 1e-9;
         let legs = platform.leg_motion();
-        let (length, rate) = (legs.length_m, Some(legs.rate_m_s));
+        let (length_m, rate_m_s) = (legs.length_m, Some(legs.rate_m_s));
         let output = controller.step(&Input {
             release_ns: now_ns,
-            measurement: Some(Measurement {
-                time_ns: now_ns,
-                length_m: length,
-                rate_m_s: rate,
-                ..Measurement::default()
-            }),
+            measurement: Some(Measurement { time_ns: now_ns, length_m, rate_m_s, ..Measurement::default() }),
             setpoint: Some(Setpoint::motion(now_ns, straight_move(&home, &top, &rise(t - 1.0, 1.0)))),
             request: Some(OperatorRequest {
                 request: Request::Engage,

@@ -41,11 +41,12 @@ fn parameters_are_found_within_their_deviations() {
         let file = machine(name);
         let (truth, series) = (drawn(&file, &mut random), Series::new(&file, share, &mut random));
         let noise = 1e-3 * file.actuator.max_force_n;
-        let (mass, at) = (0.15 * file.platform.mass_kg, [0.3, -0.2, 0.8].map(|x| x * file.joints.radius_m));
-        let with_weight = loaded(&truth, mass, Vector3::from(at));
+        let (mass_kg, at_m) =
+            (0.15 * file.platform.mass_kg, [0.3, -0.2, 0.8].map(|x| x * file.joints.radius_m));
+        let with_weight = loaded(&truth, mass_kg, Vector3::from(at_m));
         let runs = [
             run(&truth, &series, 60.0, noise, Load::Empty, &mut random),
-            run(&with_weight, &series, 60.0, noise, Load::Known { mass_kg: mass, at_m: at }, &mut random),
+            run(&with_weight, &series, 60.0, noise, Load::Known { mass_kg, at_m }, &mut random),
         ];
         let unused =
             [run(&truth, &Series::new(&file, 1.0, &mut random), 10.0, 0.0, Load::Empty, &mut random)];
@@ -131,11 +132,11 @@ fn a_flat_plate_may_be_thick() {
     truth.platform.center_of_mass_m = Vector3::new(0.01, 0.02, -0.015);
     truth.platform.inertia = Matrix3::from_diagonal(&Vector3::new(0.32, 0.17, 0.2));
     let series = Series::new(&file, 1.0, &mut random);
-    let (mass, at) = (0.5, [0.0, 0.0, 0.1]);
-    let with_weight = loaded(&truth, mass, Vector3::from(at));
+    let (mass_kg, at_m) = (0.5, [0.0, 0.0, 0.1]);
+    let with_weight = loaded(&truth, mass_kg, Vector3::from(at_m));
     let runs = [
         run(&truth, &series, 30.0, 0.1, Load::Empty, &mut random),
-        run(&with_weight, &series, 30.0, 0.1, Load::Known { mass_kg: mass, at_m: at }, &mut random),
+        run(&with_weight, &series, 30.0, 0.1, Load::Known { mass_kg, at_m }, &mut random),
     ];
     let found = identify(&file, &runs, false).unwrap();
     assert!(worst_error(&found, &truth) < 4.5);

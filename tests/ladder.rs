@@ -155,20 +155,16 @@ fn nothing() -> Link {
 /// A body and points of this mass at the `B_i`, by Steiner's theorem.
 fn with_points(machine: &Machine, mass: f64) -> Platform {
     let points = Legs::of(machine).platform.map(|b| (mass, b, Matrix3::zeros()));
-    let Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia } = machine.platform;
-    let parts: Vec<_> = [(mass, center_of_mass, inertia)].into_iter().chain(points).collect();
-    let mass: f64 = parts.iter().map(|part| part.0).sum();
-    let center_of_mass: Vector3<f64> =
-        parts.iter().map(|(mass, at, _)| at * *mass).sum::<Vector3<f64>>() / mass;
+    let Platform { mass_kg, center_of_mass_m, inertia } = machine.platform;
+    let parts: Vec<_> = [(mass_kg, center_of_mass_m, inertia)].into_iter().chain(points).collect();
+    let mass_kg: f64 = parts.iter().map(|part| part.0).sum();
+    let center_of_mass_m: Vector3<f64> =
+        parts.iter().map(|(mass, at, _)| at * *mass).sum::<Vector3<f64>>() / mass_kg;
     let about_center = |(mass, at, own): &(f64, Vector3<f64>, Matrix3<f64>)| {
-        let r: Vector3<f64> = at - center_of_mass;
+        let r: Vector3<f64> = at - center_of_mass_m;
         own + (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *mass
     };
-    Platform {
-        mass_kg: mass,
-        center_of_mass_m: center_of_mass,
-        inertia: parts.iter().map(about_center).sum(),
-    }
+    Platform { mass_kg, center_of_mass_m, inertia: parts.iter().map(about_center).sum() }
 }
 
 /// The simple fidelities are the exact model of another machine.

@@ -107,13 +107,13 @@ impl Run {
                 outcome.position.add((desired.position - actual.position).norm());
                 outcome.orientation.add(angle_between(&actual.rotation, &desired.rotation));
             }
-            let (length, rate) = hardware.measure();
+            let (length_m, rate) = hardware.measure();
             let input = Input {
                 release_ns: now_ns + period_ns / 2,
                 setpoint: Some(Setpoint::motion(now_ns, task)),
                 measurement: Some(Measurement {
                     time_ns: now_ns,
-                    length_m: length,
+                    length_m,
                     rate_m_s: Some(rate),
                     ..Measurement::default()
                 }),

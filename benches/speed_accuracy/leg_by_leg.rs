@@ -85,7 +85,7 @@ impl LegByLeg {
 
     /// Direction of a leg, force of the platform on it normal to it, and load along it.
     fn reaction(&self, leg: &Leg, motion: &Motion, arm: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>, f64) {
-        let Machine { cylinder, rod, actuator, gravity_m_s2: gravity, .. } = &self.machine;
+        let Machine { cylinder, rod, actuator, gravity_m_s2, .. } = &self.machine;
         let (omega, omega_rate) = (&motion.twist.angular, &motion.acceleration.angular);
         let span = motion.pose.position + arm - leg.base;
         let length = span.norm();
@@ -103,7 +103,7 @@ impl LegByLeg {
             + cylinder.transverse_inertia.at(length)
             + rod.transverse_inertia.at(length);
         let (j, mu) = (inertia / (length * length), (cylinder.mass_kg * e1 + rod.mass_kg * r) / length);
-        let across = accel * j - gravity * mu + n_rate * (2.0 * rate * (rod.mass_kg * r / length - j));
+        let across = accel * j - gravity_m_s2 * mu + n_rate * (2.0 * rate * (rod.mass_kg * r / length - j));
         let k = leg.universal_axis.cross(&n);
         let (un, un_rate, p) = (leg.universal_axis.dot(&n), leg.universal_axis.dot(&n_rate), n_rate.dot(&k));
         let un_over_yy = un / k.norm_squared();
@@ -112,7 +112,7 @@ impl LegByLeg {
         let spin_rate = (un_rate * (p + 2.0 * un * spin) + un * p_rate) / k.norm_squared();
         let axial_inertia = (cylinder.axial_inertia_kg_m2 + rod.axial_inertia_kg_m2) / length;
         let across = across + (n_rate.cross(&n) * spin + k * (un_over_yy * spin_rate)) * axial_inertia;
-        let along = rod.mass_kg * ((accel - gravity).dot(&n) + rod.center_of_mass_m * turning);
+        let along = rod.mass_kg * ((accel - gravity_m_s2).dot(&n) + rod.center_of_mass_m * turning);
         let drive = actuator.reflected_mass_kg * length_accel
             + leg.viscous_friction * rate
             + leg.coulomb_friction * actuator.sign(rate);

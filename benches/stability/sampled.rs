@@ -117,7 +117,7 @@ fn lines(
     label: fn(&SampledLoop) -> String,
 ) -> Vec<(String, Vec<At>, Vec<Vec<At>>)> {
     let predict = |sampled: &SampledLoop| -> Vec<At> {
-        let limit = |delay| SampledLoop { delay_periods: delay, ..*sampled }.largest_wn_t();
+        let limit = |delay_periods| SampledLoop { delay_periods, ..*sampled }.largest_wn_t();
         delays(PREDICTED).into_iter().map(|delay| (delay, limit(delay))).collect()
     };
     let predicted: Vec<_> = loops.iter().map(predict).collect();

@@ -123,8 +123,8 @@ fn continue_angles(table: &mut NumberTable, home: &[f64; 6]) {
 }
 
 /// The numbers of a row of a trajectory.
-fn numbers(Knot { t_s: t, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
-    [t].into_iter().chain([x, xd, xdd].into_iter().flat_map(<[f64; 6]>::from))
+fn numbers(Knot { t_s, state: TaskState { x, xd, xdd } }: Knot) -> impl Iterator<Item = f64> {
+    [t_s].into_iter().chain([x, xd, xdd].into_iter().flat_map(<[f64; 6]>::from))
 }
 
 /// Adds X' and X'' to a table that has only poses.

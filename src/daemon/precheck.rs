@@ -54,7 +54,7 @@ impl Precheck {
 
     /// The same with a reserve to each limit. Home at rest satisfies the reduced limits, too.
     pub fn with_reserve(mut self) -> Self {
-        let Parameters { limits, envelope, max_condition: condition, .. } = &mut self.parameters;
+        let Parameters { limits, envelope, max_condition, .. } = &mut self.parameters;
         limits.position = limits.position.scaled(USABLE_SHARE);
         limits.orientation = limits.orientation.scaled(USABLE_SHARE);
         let home = Vector6::from(self.machine.home);
@@ -64,7 +64,7 @@ impl Precheck {
             highest: nearer(highest),
         });
         let at_home = KinematicState::new(&self.machine, self.machine.home_pose()).sensitivity().condition;
-        *condition = at_home + USABLE_SHARE * (*condition - at_home);
+        *max_condition = at_home + USABLE_SHARE * (*max_condition - at_home);
         let drives = DriveCapability::new(&self.machine, &self.machine.home_pose());
         let available = self.machine.actuator.available_force();
         let at_home = drives.map_or(0.0, |drives| drives.hardest_held().1 / (MAX_HOLDING_SHARE * available));
@@ -172,8 +172,8 @@ const ADVICE_OF_LIMIT: &str = ", or set [setpoint] on_violation to limit";
 
 impl fmt::Display for SetpointRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { t_s: t, diagnostic, active_limits, policy } = self;
-        write!(f, "t = {t:.4}: ")?;
+        let Self { t_s, diagnostic, active_limits, policy } = self;
+        write!(f, "t = {t_s:.4}: ")?;
         let Some(diagnostic) = diagnostic else {
             return write!(
                 f,

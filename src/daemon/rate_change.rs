@@ -56,8 +56,9 @@ impl RateChange {
 
     /// X, X', X'' at a time since the beginning \[s\].
     pub fn at(&self, since_s: f64, at: impl FnOnce(f64) -> TaskState) -> TaskState {
-        let Profile { value_share: value, rate_per_s: rate, .. } = rise(since_s, self.duration_s);
-        let (time_rate, time_accel) = if self.is_rising { (value, rate) } else { (1.0 - value, -rate) };
+        let Profile { value_share, rate_per_s, .. } = rise(since_s, self.duration_s);
+        let (time_rate, time_accel) =
+            if self.is_rising { (value_share, rate_per_s) } else { (1.0 - value_share, -rate_per_s) };
         let TaskState { x, xd, xdd } = at(self.own_time_s(since_s));
         TaskState { x, xd: xd * time_rate, xdd: xdd * (time_rate * time_rate) + xd * time_accel }
     }

@@ -122,13 +122,13 @@ pub fn reservation(realtime: &Realtime) -> Reservation {
 /// Runs a controller at rest at home and discards its outputs.
 pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
     let task = TaskState::at_rest(machine.home);
-    let length = leg_lengths(machine, &task.motion().pose);
+    let length_m = leg_lengths(machine, &task.motion().pose);
     let input = Input {
         release_ns: 1,
         setpoint: Some(Setpoint::motion(1, task)),
         measurement: Some(Measurement {
             time_ns: 1,
-            length_m: length,
+            length_m,
             rate_m_s: Some([0.0; 6]),
             ..Measurement::default()
         }),

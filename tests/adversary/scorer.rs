@@ -68,10 +68,10 @@ impl Driven {
         while observed.time_s() < self.duration_s {
             let released_s = observed.time_s() + 0.5 * period_s;
             let task = self.task(&config.machine, released_s + 0.5 * period_s);
-            let force = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
+            let command_n = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
             let mut expected = self.task(&config.machine, released_s + period_s).motion();
             reference(&mut expected);
-            let output = Output { state: State::Engaging, command_n: force, ..Output::default() };
+            let output = Output { state: State::Engaging, command_n, ..Output::default() };
             observed.apply(&output, Some(expected));
         }
         observed.meter().extremes
@@ -177,8 +177,8 @@ fn the_end_of_a_stroke_is_seen() {
     let mut observed = Rig::metered(&config, &config.machine, parameters(&config));
     let task =
         TaskState { xdd: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0].into(), ..TaskState::at_rest(config.machine.home) };
-    let force = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
-    let output = Output { state: State::Active, command_n: force, ..Output::default() };
+    let command_n = inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap();
+    let output = Output { state: State::Active, command_n, ..Output::default() };
     let mut before = f64::NEG_INFINITY;
     while observed.meter().impact_m_s.is_none() {
         assert!(before <= 1.0, "beyond the stroke without an end stop: {before}");

@@ -76,13 +76,15 @@ fn a_missed_deadline_ends_control() {
 fn a_condition_beyond_the_limit_ends_control_and_prevents_it() {
     let config = deployed("motion_base");
     let home = TaskState::at_rest(config.machine.home);
-    let condition = KinematicState::new(&config.machine, config.machine.home_pose()).sensitivity().condition;
+    let max_condition =
+        KinematicState::new(&config.machine, config.machine.home_pose()).sensitivity().condition;
     let mut codes = Vec::new();
     for factor in [0.8, 1.25] {
         let mut plant = config.machine.clone();
         plant.platform.mass_kg *= factor;
         let mut rig = Rig::new(&config, &plant);
-        let parameters = Parameters { max_condition: condition * (1.0 + 1e-8), ..wide(parameters(&config)) };
+        let parameters =
+            Parameters { max_condition: max_condition * (1.0 + 1e-8), ..wide(parameters(&config)) };
         rig.controller = Controller::new(&config.machine, parameters);
         rig.ask(Request::Engage);
         let mut output = rig.cycle(&rig.input(&home));
@@ -96,7 +98,7 @@ fn a_condition_beyond_the_limit_ends_control_and_prevents_it() {
     }
     assert!(codes.contains(&(State::Stopping, DiagnosticCode::NearSingular)), "{codes:?}");
     let mut rig = Rig::new(&config, &config.machine);
-    let parameters = Parameters { max_condition: condition * 0.99, ..parameters(&config) };
+    let parameters = Parameters { max_condition: max_condition * 0.99, ..parameters(&config) };
     rig.controller = Controller::new(&config.machine, parameters);
     rig.ask(Request::Engage);
     let output = rig.cycle(&rig.input(&home));

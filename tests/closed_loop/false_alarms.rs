@@ -36,7 +36,7 @@ fn episode(seed: u64, duration_s: f64) -> Result<(), String> {
     let delay_us = between(100.0, 5000.0).round();
     // Shares of the largest force: what the model has, and what the drive has. With more stiction than 0.2 % beyond the model a leg of
     // a light machine sticks at a crawl for longer than a sensor may be silent.
-    let (modelled, friction, stiction) = (between(0.0, 0.005), between(0.8, 1.2), between(0.0, 0.0005));
+    let (modelled, friction, stiction_n) = (between(0.0, 0.005), between(0.8, 1.2), between(0.0, 0.0005));
     let mut config = configured(
         machine,
         &format!(
@@ -52,7 +52,7 @@ fn episode(seed: u64, duration_s: f64) -> Result<(), String> {
         drive: DriveErrors { dead_time_ns: (1e3 * (delay_us - 100.0)) as u64, ..DriveErrors::default() },
         friction: Friction {
             coulomb_n: modelled * friction * most,
-            stiction_n: stiction * most,
+            stiction_n: stiction_n * most,
             ..Friction::default()
         },
         sensor: SensorErrors { length_step_m: step, length_noise_m: noise, ..SensorErrors::default() },
@@ -71,7 +71,7 @@ fn episode(seed: u64, duration_s: f64) -> Result<(), String> {
         if control.time_s() > SETTLED_S && (state, diagnostic.code) != (State::Active, DiagnosticCode::None) {
             return Err(format!(
                 "{machine}, seed {seed}, speed {share}, after {:.3} s: {state:?}, {diagnostic:?}; noise {noise:.1e} m, step \
-                 {step:.1e} m, delay {delay_us} us, friction {modelled:.4} x {friction:.2} + {stiction:.4}",
+                 {step:.1e} m, delay {delay_us} us, friction {modelled:.4} x {friction:.2} + {stiction_n:.4}",
                 control.time_s()
             ));
         }

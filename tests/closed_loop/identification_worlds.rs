@@ -67,8 +67,8 @@ fn played_in(
             let axis = Vector3::new(turn.cos(), turn.sin(), 0.0) * degrees.to_radians();
             platform.gravity_m_s2 = Rotation3::new(axis) * platform.gravity_m_s2;
         }
-        World::Joints(joints) => {
-            imperfections.build = BuildErrors { joint_deviation_m: joints, ..BuildErrors::default() }
+        World::Joints(joint_deviation_m) => {
+            imperfections.build = BuildErrors { joint_deviation_m, ..BuildErrors::default() }
         }
         World::Stiction(share) => {
             imperfections.friction = Friction { stiction_n: share * most, ..Friction::default() };
@@ -155,11 +155,11 @@ fn identified_in(world: World, config: &Config, seed: u64) -> (usize, usize, Exa
     let excitation =
         Trajectory::Excitation(Box::new(Trajectory::excitation(config, 6, amplitude, 1).unwrap()));
     let truth = drawn(file, &mut Random::new(seed));
-    let (mass, at) = (0.15 * file.platform.mass_kg, [0.3, -0.2, 0.8]);
-    let [empty, heavy] = [truth.clone(), loaded(&truth, mass, Vector3::from(at))]
+    let (mass_kg, at_m) = (0.15 * file.platform.mass_kg, [0.3, -0.2, 0.8]);
+    let [empty, heavy] = [truth.clone(), loaded(&truth, mass_kg, Vector3::from(at_m))]
         .map(|platform| played_in(world, config, &platform, &excitation, seed));
     let runs = |delay_s: f64| {
-        [(&empty, Load::Empty), (&heavy, Load::Known { mass_kg: mass, at_m: at })]
+        [(&empty, Load::Empty), (&heavy, Load::Known { mass_kg, at_m })]
             .map(|(stretch, load)| Run { samples: samples(stretch, delay_s), load })
     };
     let first = identify(file, &runs(SENDING / 1000.0), false).unwrap();

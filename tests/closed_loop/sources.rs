@@ -186,17 +186,12 @@ fn a_platform_that_was_near_its_setpoint_is_active_within_two_seconds() {
         config.deployment.limits.reference.orientation.jerk = jerk;
         let motion = fit(&config.machine, BuiltInMotion::Sines, 8.0);
         let mut ride = Ride::new(&config);
-        let Parameters {
-            engage_position_m: engage_position,
-            engage_orientation_rad: engage_orientation,
-            law,
-            ..
-        } = ride.parameters;
+        let Parameters { engage_position_m, engage_orientation_rad, law, .. } = ride.parameters;
         let is_near = |ride: &Ride, task: &TaskState| {
             let [linear, angular] = ride.distance(task);
             let [velocity, angular_velocity] = ride.velocity_error(task);
-            linear.max(velocity / law.position.kp_per_s2.sqrt()) < engage_position
-                && angular.max(angular_velocity / law.orientation.kp_per_s2.sqrt()) < engage_orientation
+            linear.max(velocity / law.position.kp_per_s2.sqrt()) < engage_position_m
+                && angular.max(angular_velocity / law.orientation.kp_per_s2.sqrt()) < engage_orientation_rad
         };
         let (mut near, mut active): (Option<u32>, Option<u32>) = (None, None);
         for k in 0..40_000 {

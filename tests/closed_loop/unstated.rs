@@ -34,7 +34,7 @@ fn episode(seed: u64) -> Result<(), String> {
     let mut between = |least: f64, most: f64| least + (most - least) * random.uniform();
     let config = configured(machine, "");
     let dry = between(0.0, 1.0) * config.machine.actuator.friction_uncertainty_n;
-    let (stiction, lag) = (between(0.0, 0.5), between(0.01, 0.99));
+    let (stiction_n, lag) = (between(0.0, 0.5), between(0.01, 0.99));
     let (delay_us, step) = (between(0.0, 3000.0).round(), 10.0_f64.powf(between(-8.0, -4.7)));
     let imperfections = Imperfections {
         seed,
@@ -44,8 +44,8 @@ fn episode(seed: u64) -> Result<(), String> {
             ..DriveErrors::default()
         },
         friction: Friction {
-            coulomb_n: (1.0 - stiction) * dry,
-            stiction_n: stiction * dry,
+            coulomb_n: (1.0 - stiction_n) * dry,
+            stiction_n: stiction_n * dry,
             stribeck_speed_m_s: 10.0_f64.powf(between(-3.3, -2.0)),
             ..Friction::default()
         },
@@ -58,7 +58,7 @@ fn episode(seed: u64) -> Result<(), String> {
     };
     play(&config, &imperfections, motion).map_err(|ended| {
         format!(
-            "{machine} {motion:?}, seed {seed}, {ended}; {dry:.1} N of dry friction, {stiction:.2} of it stiction, delay {delay_us} us, \
+            "{machine} {motion:?}, seed {seed}, {ended}; {dry:.1} N of dry friction, {stiction_n:.2} of it stiction, delay {delay_us} us, \
              {lag:.2} of it lag, step {step:.1e} m"
         )
     })

@@ -60,11 +60,11 @@ impl Seen {
         if let Some(setpoint) = &input.setpoint {
             self.add(setpoint.kind);
         }
-        if let Some(Measurement { rate_m_s: rate, pose, drives, .. }) = &input.measurement {
-            let DriveStatus { enabled, brake_open, fault, force_n: force } = drives;
-            let is_given = [enabled.is_some(), brake_open.is_some(), fault.is_some(), force.is_some()];
-            self.add_if(rate.is_some(), "rates");
-            self.add_if(rate.is_none(), "lengths alone");
+        if let Some(Measurement { rate_m_s, pose, drives, .. }) = &input.measurement {
+            let DriveStatus { enabled, brake_open, fault, force_n } = drives;
+            let is_given = [enabled.is_some(), brake_open.is_some(), fault.is_some(), force_n.is_some()];
+            self.add_if(rate_m_s.is_some(), "rates");
+            self.add_if(rate_m_s.is_none(), "lengths alone");
             self.add_if(pose.is_some(), "a pose of another sensor");
             self.add_if(is_given == [true; 4], "a whole status of the drives");
             self.add_if(is_given == [false, false, true, false], "a part of the status of the drives");

@@ -30,7 +30,7 @@ impl OutputHash {
             diagnostic,
             answered_message: MessageId { epoch, sequence },
             request_diagnostic,
-            command_n: force,
+            command_n,
             wrench_error: Wrench { torque, force: wrench_force },
             active_limits: LimitSet(limits),
             missed_measurements,
@@ -44,16 +44,15 @@ impl OutputHash {
         self.word(*epoch);
         self.word(*sequence);
         self.diagnostic(request_diagnostic);
-        self.numbers(force.iter().chain(torque).chain(wrench_force));
+        self.numbers(command_n.iter().chain(torque).chain(wrench_force));
         self.word((*limits).into());
         self.word(*missed_measurements);
         self.word(*missed_setpoints);
         self.optional(platform.as_ref(), |hash, platform| {
-            let PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity } =
-                platform;
+            let PlatformState { pose, twist, condition, time_to_singularity_s } = platform;
             hash.pose(pose);
             hash.twist(twist);
-            hash.numbers([condition, time_to_singularity]);
+            hash.numbers([condition, time_to_singularity_s]);
         });
         self.optional(error.as_ref(), |hash, PoseError { pose, twist }| {
             hash.twist(pose);

@@ -71,20 +71,20 @@ impl Heave {
 
     /// A move of minimum jerk from rest to rest.
     pub fn moving(&self, [from, to]: [f64; 2], duration_s: f64, t: f64) -> TaskState {
-        let Profile { value_share: s, rate_per_s: rate, accel_per_s2: accel } = rise(t, duration_s);
+        let Profile { value_share: s, rate_per_s, accel_per_s2 } = rise(t, duration_s);
         let d = to - from;
-        self.at([from + d * s, d * rate, d * accel])
+        self.at([from + d * s, d * rate_per_s, d * accel_per_s2])
     }
 
     /// A sine about an offset that grows from rest.
     pub fn sine(&self, middle: f64, amplitude: f64, omega: f64, t: f64) -> TaskState {
-        let Profile { value_share: s, rate_per_s: rate, accel_per_s2: accel } = rise(t, FADE_S);
+        let Profile { value_share: s, rate_per_s, accel_per_s2 } = rise(t, FADE_S);
         let (sin, cos) = (omega * t).sin_cos();
         let (x, v, a) = (sin, omega * cos, -omega * omega * sin);
         self.at([
             middle + amplitude * s * x,
-            amplitude * (s * v + rate * x),
-            amplitude * (s * a + 2.0 * rate * v + accel * x),
+            amplitude * (s * v + rate_per_s * x),
+            amplitude * (s * a + 2.0 * rate_per_s * v + accel_per_s2 * x),
         ])
     }
 }

@@ -78,20 +78,13 @@ fn written(table: &Table, machine: &Machine) -> Table {
     let elements = [("xx", i.m11), ("yy", i.m22), ("zz", i.m33), ("xy", i.m12), ("xz", i.m13), ("yz", i.m23)];
     let inertia: Table = elements.into_iter().map(|(key, value)| (key.to_owned(), value.into())).collect();
     set(&mut table, "platform", "inertia_kg_m2", inertia);
-    for (
-        section,
-        Link {
-            mass_kg: mass,
-            center_of_mass_m: center_of_mass,
-            axial_inertia_kg_m2: axial_inertia,
-            transverse_inertia,
-        },
-    ) in [("cylinder", &machine.cylinder), ("rod", &machine.rod)]
+    for (section, Link { mass_kg, center_of_mass_m, axial_inertia_kg_m2, transverse_inertia }) in
+        [("cylinder", &machine.cylinder), ("rod", &machine.rod)]
     {
         assert_eq!(transverse_inertia.quadratic_kg, 0.0, "a number in the file");
-        set(&mut table, section, "mass_kg", *mass);
-        set(&mut table, section, "center_of_mass_m", *center_of_mass);
-        set(&mut table, section, "axial_inertia_kg_m2", *axial_inertia);
+        set(&mut table, section, "mass_kg", *mass_kg);
+        set(&mut table, section, "center_of_mass_m", *center_of_mass_m);
+        set(&mut table, section, "axial_inertia_kg_m2", *axial_inertia_kg_m2);
         set(&mut table, section, "transverse_inertia_kg_m2", transverse_inertia.constant_kg_m2);
     }
     let actuator = &machine.actuator;

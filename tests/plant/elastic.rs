@@ -34,10 +34,10 @@ fn total(machine: &Machine, simulator: &Simulator, spring: &ElasticLeg) -> f64 {
 /// Springs that were loaded ring without end: their energy stays, play or not.
 #[test]
 fn springs_keep_energy() {
-    for backlash in [0.0, 2e-4] {
+    for backlash_m in [0.0, 2e-4] {
         let mut machine = smooth("motion_base");
         machine.gravity_m_s2.fill(0.0);
-        let spring = ElasticLeg { backlash_m: backlash, ..SPRING };
+        let spring = ElasticLeg { backlash_m, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         simulator.advance(0.02, Some(&[4000.0, -4000.0, 4000.0, 3000.0, -2000.0, 1000.0]));
         let start = total(&machine, &simulator, &spring);
@@ -50,7 +50,7 @@ fn springs_keep_energy() {
                 swing.max((drives - Vector6::from(leg_lengths(&machine, &simulator.state().pose))).amax());
         }
         // Contact that comes and goes within a step costs order.
-        assert!(worst < if backlash == 0.0 { 1e-6 } else { 1e-3 }, "{worst}");
+        assert!(worst < if backlash_m == 0.0 { 1e-6 } else { 1e-3 }, "{worst}");
         assert!(swing > 2e-5, "it rings: {swing}");
         assert_eq!(simulator.brakes(), Brakes::Open);
     }
@@ -60,8 +60,8 @@ fn springs_keep_energy() {
 fn damping_takes_the_ringing_away() {
     let mut machine = smooth("motion_base");
     machine.gravity_m_s2.fill(0.0);
-    let ringing = |damping| {
-        let spring = ElasticLeg { damping_n_s_m: damping, ..SPRING };
+    let ringing = |damping_n_s_m| {
+        let spring = ElasticLeg { damping_n_s_m, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         simulator.advance(0.02, Some(&[4000.0, -4000.0, 4000.0, 3000.0, -2000.0, 1000.0]));
         simulator.advance(0.5, Some(&[0.0; LEGS]));
@@ -76,14 +76,14 @@ fn damping_takes_the_ringing_away() {
 #[test]
 fn a_loaded_leg_is_deflected_and_at_rest() {
     let machine = smooth("motion_base");
-    for backlash in [0.0, 1e-4] {
-        let spring = ElasticLeg { backlash_m: backlash, ..SPRING };
+    for backlash_m in [0.0, 1e-4] {
+        let spring = ElasticLeg { backlash_m, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         let legs = leg_lengths(&machine, &simulator.state().pose);
         let hold = holding(&machine, &simulator.state().pose);
         for i in 0..LEGS {
             let deflection = simulator.leg_motion().length_m[i] - legs[i];
-            let expected = hold[i] / spring.stiffness_n_per_m + 0.5 * backlash * hold[i].signum();
+            let expected = hold[i] / spring.stiffness_n_per_m + 0.5 * backlash_m * hold[i].signum();
             assert!((deflection - expected).abs() < 1e-12 && deflection > 1e-5, "{deflection} {expected}");
         }
         simulator.advance(0.2, Some(&hold));
@@ -133,8 +133,8 @@ fn a_stiff_leg_is_nearly_rigid() {
         simulator.state().pose
     };
     let rigid = run(None);
-    let [softer, stiffer] = [1e8, 4e8].map(|stiffness| {
-        let spring = ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: 1e5, ..SPRING };
+    let [softer, stiffer] = [1e8, 4e8].map(|stiffness_n_per_m| {
+        let spring = ElasticLeg { stiffness_n_per_m, damping_n_s_m: 1e5, ..SPRING };
         run(Some(spring)).displacement_to(&rigid).linear.norm()
     });
     let way = home(&machine).pose.displacement_to(&rigid).linear.norm();
@@ -146,8 +146,8 @@ fn a_stiff_leg_is_nearly_rigid() {
 #[test]
 fn the_step_keeps_the_tolerance() {
     let machine = smooth("motion_base");
-    let spring = |stiffness, damping| {
-        elastic(ElasticLeg { stiffness_n_per_m: stiffness, damping_n_s_m: damping, backlash_m: 0.0 })
+    let spring = |stiffness_n_per_m, damping_n_s_m| {
+        elastic(ElasticLeg { stiffness_n_per_m, damping_n_s_m, backlash_m: 0.0 })
     };
     let lag = |hertz| {
         let mut wanted = Imperfections::default();
@@ -191,9 +191,8 @@ fn the_step_keeps_the_tolerance() {
 #[test]
 fn what_cannot_be_seen_is_left_out() {
     let machine = machine("motion_base");
-    let terms = |stiffness, backlash, hertz| {
-        let mut wanted =
-            elastic(ElasticLeg { stiffness_n_per_m: stiffness, backlash_m: backlash, damping_n_s_m: 0.0 });
+    let terms = |stiffness_n_per_m, backlash_m, hertz| {
+        let mut wanted = elastic(ElasticLeg { stiffness_n_per_m, backlash_m, damping_n_s_m: 0.0 });
         wanted.drive.bandwidth_hz = Some(hertz);
         let terms = *simulator(&machine, &wanted).terms();
         (terms.elastic.is_some(), terms.lag_per_s.is_some(), terms.step_s < DEFAULT_STEP_S)

@@ -60,15 +60,10 @@ fn rescaled(machine: &Machine, motion: &Motion, s: f64, m: f64, t: f64) -> (Mach
     result.platform.center_of_mass_m *= s;
     result.platform.inertia *= m * s * s;
     for link in [&mut result.cylinder, &mut result.rod] {
-        let Link {
-            mass_kg: mass,
-            center_of_mass_m: center_of_mass,
-            axial_inertia_kg_m2: axial_inertia,
-            transverse_inertia,
-        } = link;
-        *mass *= m;
-        *center_of_mass *= s;
-        *axial_inertia *= m * s * s;
+        let Link { mass_kg, center_of_mass_m, axial_inertia_kg_m2, transverse_inertia } = link;
+        *mass_kg *= m;
+        *center_of_mass_m *= s;
+        *axial_inertia_kg_m2 *= m * s * s;
         transverse_inertia.constant_kg_m2 *= m * s * s;
         transverse_inertia.quadratic_kg *= m;
         transverse_inertia.reference_length_m *= s;

@@ -104,9 +104,9 @@ fn forces(time_s: f64, d: f64) -> [Vec<[f64; 6]>; 2] {
         rig.engage(&home[which]);
         let cycle = |k: u32| {
             let task = tasks(f64::from(k) * 1e-3, time_s, d, height)[which];
-            let Output { state, diagnostic, command_n: force, .. } = rig.cycle(&rig.input(&task));
+            let Output { state, diagnostic, command_n, .. } = rig.cycle(&rig.input(&task));
             assert_eq!((state, diagnostic.code), (State::Active, DiagnosticCode::None), "{d} rad, cycle {k}");
-            force
+            command_n
         };
         (0..(time_s * 1e3) as u32 + 300).map(cycle).collect()
     })

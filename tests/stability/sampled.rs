@@ -6,12 +6,12 @@ use hexad_support::stability::delayed::{Delayed, PUSH, Setup, boundary};
 use super::*;
 
 /// Half of the delay is not known to the estimator.
-fn sampled_loop(damping_ratio: f64, delay: f64) -> SampledLoop {
+fn sampled_loop(damping_ratio: f64, delay_periods: f64) -> SampledLoop {
     SampledLoop {
         wn_t: f64::NAN,
         damping_ratio,
-        known_delay_periods: 0.5 * delay,
-        delay_periods: delay,
+        known_delay_periods: 0.5 * delay_periods,
+        delay_periods,
         ..SampledLoop::default()
     }
 }

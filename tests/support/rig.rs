@@ -232,11 +232,11 @@ impl Rig {
     }
 
     pub fn measurement(&self) -> Measurement {
-        let [length, rate] = self.measured;
+        let [length_m, rate] = self.measured;
         let has_rates = self.rates.are_sent((self.now_ns - START_NS) / self.parameters.period_ns);
         Measurement {
             time_ns: self.now_ns,
-            length_m: length,
+            length_m,
             rate_m_s: has_rates.then_some(rate),
             ..Measurement::default()
         }

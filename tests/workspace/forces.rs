@@ -35,8 +35,8 @@ fn dry(name: &str) -> Machine {
 
 /// An acceleration that asks for about a third of the actuators' force.
 fn effort(machine: &Machine) -> AccelerationDemand {
-    let linear = machine.actuator.max_force_n / machine.platform.mass_kg;
-    AccelerationDemand { linear_m_s2: linear, angular_rad_s2: linear / machine.joints.radius_m }
+    let linear_m_s2 = machine.actuator.max_force_n / machine.platform.mass_kg;
+    AccelerationDemand { linear_m_s2, angular_rad_s2: linear_m_s2 / machine.joints.radius_m }
 }
 
 #[test]

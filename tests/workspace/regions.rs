@@ -66,14 +66,15 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
     for name in ["fried2008", "motion_base", "tsai2000", "reference"] {
         let config = deployed(name);
         let machine = &config.machine;
-        for turn in [0.0, TURN] {
-            let found = found(&config, &RegionShape::Ball { turn_rad: turn });
+        for turn_rad in [0.0, TURN] {
+            let found = found(&config, &RegionShape::Ball { turn_rad });
             assert!(found.guaranteed > 0.1 * machine.joints.radius_m, "{name}: {found:?}");
-            let bad = (0..SAMPLES).find(|k| !is_fine(&config, &of_ball(machine, *k, found.guaranteed, turn)));
+            let bad =
+                (0..SAMPLES).find(|k| !is_fine(&config, &of_ball(machine, *k, found.guaranteed, turn_rad)));
             assert_eq!(bad, None, "{name}: {found:?}");
             // C comes as far along a leg as that leg has stroke left: that is the ball of an orientation.
             let (size, obstacle) = found.violation.unwrap();
-            let least = (0..SAMPLES).map(|k| margin(machine, &of_ball(machine, 2 * k, 0.0, turn)));
+            let least = (0..SAMPLES).map(|k| margin(machine, &of_ball(machine, 2 * k, 0.0, turn_rad)));
             let least = least.fold(f64::INFINITY, f64::min);
             match obstacle {
                 WorkspaceLimit::LegTooShort(_) | WorkspaceLimit::LegTooLong(_) => {

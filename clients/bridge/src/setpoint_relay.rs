@@ -83,15 +83,14 @@ impl<'a, Id: Ord + Clone + Debug> SetpointRelay<'a, Id> {
         if !(0..=timeout_ns as i64).contains(&ahead_ns) {
             return Err(Rejection::Ahead(ahead_ns as f64 * 1e-9, timeout_ns as f64 * 1e-6));
         }
-        let SourceInstant { time_ns, rate_ratio: rate } =
-            source.clock.instant(stamp_ns, arrival_ns as i64)?;
+        let SourceInstant { time_ns, rate_ratio } = source.clock.instant(stamp_ns, arrival_ns as i64)?;
         source.seen_ns = arrival_ns;
-        let time_ns = time_ns.saturating_add((ahead_ns as f64 / rate) as i64) as u64;
-        self.newest = Some(Setpoint { kind, ..Setpoint::motion(time_ns, task.at_rate(rate)) });
+        let time_ns = time_ns.saturating_add((ahead_ns as f64 / rate_ratio) as i64) as u64;
+        self.newest = Some(Setpoint { kind, ..Setpoint::motion(time_ns, task.at_rate(rate_ratio)) });
         if self.followed.replace(id.clone()).is_none() {
             let clock = self.config.deployment.setpoint.clock;
             info!(
-                "follows the source {id:?}: setpoint.clock is {clock:?}, its clock runs at {rate:.3} of real time"
+                "follows the source {id:?}: setpoint.clock is {clock:?}, its clock runs at {rate_ratio:.3} of real time"
             );
         }
         Ok(())

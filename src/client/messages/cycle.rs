@@ -168,8 +168,8 @@ impl CycleMessage {
         (self.setpoint_process, self.setpoint_process_ignored) = (used_pid, ignored_pid);
         let Publishers { used_pid, ignored_pid } = input.measured_publishers;
         (self.measured_process, self.measured_process_ignored) = (used_pid, ignored_pid);
-        if let Some(Setpoint { kind, time_ns, task, target_speed_share: target_speed }) = input.setpoint {
-            self.setpoint_target_speed = target_speed;
+        if let Some(Setpoint { kind, time_ns, task, target_speed_share }) = input.setpoint {
+            self.setpoint_target_speed = target_speed_share;
             (self.has_setpoint, self.setpoint_kind, self.setpoint_time_ns) = (1, kind as u32, time_ns);
             [self.setpoint_x, self.setpoint_x_rate, self.setpoint_x_accel] =
                 [task.x, task.xd, task.xdd].map(Into::into);
@@ -199,13 +199,11 @@ impl CycleMessage {
         (self.force_n, self.wrench_error) = (output.command_n, output.wrench_error.vector().into());
         (self.missed_measurements, self.missed_setpoints) =
             (output.missed_measurements, output.missed_setpoints);
-        if let Some(PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity }) =
-            &output.platform
-        {
+        if let Some(PlatformState { pose, twist, condition, time_to_singularity_s }) = &output.platform {
             self.has_platform = 1;
             (self.rotation, self.position_m) = pose_numbers(pose);
             self.twist = twist.vector().into();
-            (self.condition, self.time_to_singularity_s) = (*condition, *time_to_singularity);
+            (self.condition, self.time_to_singularity_s) = (*condition, *time_to_singularity_s);
         }
         if let Some(PoseError { pose, twist }) = &output.error {
             self.has_error = 1;

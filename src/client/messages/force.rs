@@ -79,10 +79,10 @@ mod tests {
 
     #[test]
     fn a_force_is_valid_only_under_control() {
-        let force = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let command_n = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         let mut output = Output {
             diagnostic: DiagnosticCode::SetpointTooFar.into(),
-            command_n: force,
+            command_n,
             active_limits: LimitSet(6),
             ..Output::default()
         };
@@ -95,7 +95,7 @@ mod tests {
                 [u32::from(state.has_control()), state as u32, DiagnosticCode::SetpointTooFar as u32, 6],
                 "{state:?}"
             );
-            assert_eq!((message.force_n, message.release_ns), (force, 91));
+            assert_eq!((message.force_n, message.release_ns), (command_n, 91));
         }
     }
 

@@ -92,10 +92,9 @@ mod tests {
     fn a_measurement_contains_the_numbers_of_the_message() {
         let some = DriveStatus { enabled: Some(1), brake_open: None, fault: Some(3), force_n: None };
         let others = DriveStatus { enabled: None, brake_open: Some(2), fault: None, force_n: Some([4.0; 6]) };
-        for (rate, drives) in [(None, some), (Some([7.0, 8.0, 9.0, 10.0, 11.0, 12.0]), others)] {
-            let length = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-            let measurement =
-                Measurement { time_ns: 42, length_m: length, rate_m_s: rate, pose: rate, drives };
+        for (rate_m_s, drives) in [(None, some), (Some([7.0, 8.0, 9.0, 10.0, 11.0, 12.0]), others)] {
+            let length_m = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+            let measurement = Measurement { time_ns: 42, length_m, rate_m_s, pose: rate_m_s, drives };
             let mut message = MeasuredMessage::from(&measurement);
             message.header.time_ns = 42;
             assert_eq!(Measurement::from(&message), measurement);

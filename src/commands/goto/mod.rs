@@ -109,8 +109,8 @@ impl GotoArguments {
 
     /// What the daemon makes of the request.
     fn order(&self, target: [Option<f64>; 6]) -> GotoOrder {
-        let Self { relative, home, speed, tolerance: tolerance_m, .. } = *self;
-        GotoOrder { target, relative, home, speed_share: speed, tolerance_m }
+        let Self { relative, home, speed: speed_share, tolerance: tolerance_m, .. } = *self;
+        GotoOrder { target, relative, home, speed_share, tolerance_m }
     }
 
     /// Prints the motion that the request would begin.

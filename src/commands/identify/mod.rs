@@ -145,11 +145,11 @@ impl IdentifyArguments {
     }
 
     fn known_weight(&self) -> Result<Load, Failure> {
-        let (Some(mass), Some(at)) = (self.known_mass, self.at) else { return Ok(Load::Empty) };
-        if mass > 0.0 && mass.is_finite() {
-            return Ok(Load::Known { mass_kg: mass, at_m: at });
+        let (Some(mass_kg), Some(at_m)) = (self.known_mass, self.at) else { return Ok(Load::Empty) };
+        if mass_kg > 0.0 && mass_kg.is_finite() {
+            return Ok(Load::Known { mass_kg, at_m });
         }
-        Err(Failure::after_start(format_args!("--known-mass = {mass} kg: must be greater than 0")))
+        Err(Failure::after_start(format_args!("--known-mass = {mass_kg} kg: must be greater than 0")))
     }
 }
 

@@ -79,15 +79,15 @@ pub(super) fn new_values(
 /// Platform and payload as one body.
 fn joined(machine: &Machine, payload: &Platform) -> Platform {
     let platform = &machine.platform;
-    let mass = platform.mass_kg + payload.mass_kg;
-    let center_of_mass =
-        (platform.center_of_mass_m * platform.mass_kg + payload.center_of_mass_m * payload.mass_kg) / mass;
+    let mass_kg = platform.mass_kg + payload.mass_kg;
+    let center_of_mass_m =
+        (platform.center_of_mass_m * platform.mass_kg + payload.center_of_mass_m * payload.mass_kg) / mass_kg;
     let about = |body: &Platform| {
-        let r: Vector3<f64> = body.center_of_mass_m - center_of_mass;
+        let r: Vector3<f64> = body.center_of_mass_m - center_of_mass_m;
         let point = Matrix3::identity() * r.norm_squared() - r * r.transpose();
         (if body.mass_kg > 0.0 { body.inertia } else { Matrix3::zeros() }) + point * body.mass_kg
     };
-    Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia: about(platform) + about(payload) }
+    Platform { mass_kg, center_of_mass_m, inertia: about(platform) + about(payload) }
 }
 
 /// Friction that the new file may lack \[N\], rounded up.

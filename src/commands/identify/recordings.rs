@@ -98,8 +98,8 @@ impl StretchReader {
         };
         let is_new = measured.last().is_none_or(|last| last.time_ns < measurement.time_ns);
         if is_new && !missed {
-            let (time_ns, length) = (measurement.time_ns, measurement.length_m);
-            measured.push(MeasuredMotion { time_ns, length_m: length, pose: platform.pose, reference });
+            let (time_ns, length_m) = (measurement.time_ns, measurement.length_m);
+            measured.push(MeasuredMotion { time_ns, length_m, pose: platform.pose, reference });
         }
     }
 

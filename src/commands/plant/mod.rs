@@ -189,7 +189,7 @@ impl DrivenPlant {
     }
 
     fn measure(&mut self) -> MeasuredMessage {
-        let (length, rate) = self.hardware.measure();
+        let (length_m, rate) = self.hardware.measure();
         let simulator = self.hardware.simulator();
         let state = simulator.state();
         MeasuredMessage {
@@ -198,7 +198,7 @@ impl DrivenPlant {
             twist: state.twist.vector().into(),
             ..MeasuredMessage::from(&Measurement {
                 time_ns: self.time_ns,
-                length_m: length,
+                length_m,
                 rate_m_s: Some(rate),
                 drives: self.drive_status(),
                 ..Measurement::default()

@@ -248,9 +248,8 @@ mod tests {
             let time_ns = release_ns - AGE_NS;
             let Motion { pose, twist, .. } = motion(time_ns);
             let legs = leg_motion(&config.machine, &motion(time_ns));
-            let (length, rate) = (legs.length_m, Some(legs.rate_m_s));
-            let measurement =
-                Some(Measurement { time_ns, length_m: length, rate_m_s: rate, ..Measurement::default() });
+            let (length_m, rate_m_s) = (legs.length_m, Some(legs.rate_m_s));
+            let measurement = Some(Measurement { time_ns, length_m, rate_m_s, ..Measurement::default() });
             let platform =
                 Some(PlatformState { pose, twist, condition: 1.0, time_to_singularity_s: f64::INFINITY });
             let reference = Some(motion(release_ns + instants.reference_ns));

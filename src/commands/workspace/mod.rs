@@ -188,10 +188,15 @@ fn slices(
     slices
 }
 
-fn regions(machine: &Machine, clearance: &Clearance, turn: f64, shape: &EnvelopeBounds) -> [RegionBounds; 3] {
+fn regions(
+    machine: &Machine,
+    clearance: &Clearance,
+    turn_rad: f64,
+    shape: &EnvelopeBounds,
+) -> [RegionBounds; 3] {
     let shapes = [
         RegionShape::Ball { turn_rad: 0.0 },
-        RegionShape::Ball { turn_rad: turn },
+        RegionShape::Ball { turn_rad },
         RegionShape::Box { low: shape.pose_min, high: shape.pose_max },
     ];
     // Each ball takes two searches, the box one.

@@ -220,15 +220,9 @@ impl Slice {
         );
         let mut writer = CsvWriter::new(&columns);
         for (x, quality) in self.poses() {
-            let PoseQuality {
-                stroke_margin_m: stroke_margin,
-                determinant,
-                condition,
-                worst_force_n: worst_force,
-                payload_kg: payload,
-            } = *quality;
+            let PoseQuality { stroke_margin_m, determinant, condition, worst_force_n, payload_kg } = *quality;
             let in_reach = f64::from(u8::from(quality.within_reach()));
-            let values = [in_reach, stroke_margin, determinant, condition, worst_force, payload];
+            let values = [in_reach, stroke_margin_m, determinant, condition, worst_force_n, payload_kg];
             writer.row(x.into_iter().chain(values));
         }
         writer.save(path)

@@ -69,18 +69,17 @@ impl Constants {
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
         let home = KinematicState::new(machine, machine.home_pose());
         let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
-        let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
+        let arm_m = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
         let NoiseModel { bandwidth_rad_s, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth_rad_s, period_s, rate_noise_ratio: None };
-        let Law { mode, leg_masses, max_compensated_acceleration: max_compensated_disturbance, .. } =
-            &parameters.law;
+        let Law { mode, leg_masses, max_compensated_acceleration, .. } = &parameters.law;
         let acceleration_by_command = InputMatrix::at_home(machine, *mode, leg_masses, parameters.fidelity);
         let disturbance =
-            acceleration_by_command.largest_compensable_disturbance(max_compensated_disturbance);
+            acceleration_by_command.largest_compensable_disturbance(max_compensated_acceleration);
         let limits = parameters.unscaled_limits();
         let feedback_only =
-            parameters.law.max_leg_acceleration_without_feedforward(&limits, arm, &disturbance);
-        let angle_weighting_radius_m = if mode.acts_on_legs() { 1.0 } else { arm };
+            parameters.law.max_leg_acceleration_without_feedforward(&limits, arm_m, &disturbance);
+        let angle_weighting_radius_m = if mode.acts_on_legs() { 1.0 } else { arm_m };
         let by_force = acceleration_by_command.acceleration_by_force(machine, home.pose());
         let least_missing = least_missing_force_acceleration(
             &by_force,
@@ -112,7 +111,7 @@ impl Constants {
                 f64::INFINITY,
             ),
             parameters,
-            arm_m: arm,
+            arm_m,
             max_reference_condition: max_reference_condition(&home, parameters.max_condition),
             least_universal_sine: least_universal_sine(machine, &home),
             force_changes: ForceChangeBounds::new(machine),

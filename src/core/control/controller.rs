@@ -219,13 +219,13 @@ impl Output {
     /// Output of a state, without the motions of platform and reference, and without counts.
     #[inline(always)]
     fn new(supervisor: &Supervisor, limited: &LimitedForces, error: Option<PoseError>) -> Self {
-        let LimitedForces { command_n: force, wrench_error, active_limits } = *limited;
+        let LimitedForces { command_n, wrench_error, active_limits } = *limited;
         Self {
             state: supervisor.current.state,
             diagnostic: supervisor.current.diagnostic,
             answered_message: supervisor.answered_message,
             request_diagnostic: supervisor.request_diagnostic,
-            command_n: force,
+            command_n,
             wrench_error,
             active_limits,
             missed_measurements: 0,

@@ -99,15 +99,13 @@ impl Parameters {
     /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided
     /// by `wn = sqrt(Kp)`, so that it compares with a pose error.
     pub fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
-        let Self {
-            law, engage_position_m: engage_position, engage_orientation_rad: engage_orientation, ..
-        } = self;
+        let Self { law, engage_position_m, engage_orientation_rad, .. } = self;
         let PoseError { pose, twist } = error;
         largest_ratio([
-            pose.linear.norm() / engage_position,
-            pose.angular.norm() / engage_orientation,
-            twist.linear.norm() / (law.position.kp_per_s2.sqrt() * engage_position),
-            twist.angular.norm() / (law.orientation.kp_per_s2.sqrt() * engage_orientation),
+            pose.linear.norm() / engage_position_m,
+            pose.angular.norm() / engage_orientation_rad,
+            twist.linear.norm() / (law.position.kp_per_s2.sqrt() * engage_position_m),
+            twist.angular.norm() / (law.orientation.kp_per_s2.sqrt() * engage_orientation_rad),
         ])
     }
 

@@ -33,10 +33,10 @@ impl Conditioning {
         dispatch!(machine.level, simd => {
             let legs = LegGeometry::around_center(simd, joints, pose);
             let factorization = Factorization::new(simd, joints, &legs);
-            let (sensitivity, largest_row) =
+            let (sensitivity, largest_row_norm) =
                 Sensitivity::with_largest_row(simd, joints, &legs, &factorization);
             Self {
-                largest_row_norm: largest_row,
+                largest_row_norm: largest_row_norm,
                 sensitivity,
                 shortest_leg_m: least_of_legs(legs.length_m),
                 universal_sine: legs.universal_sine(simd, joints),

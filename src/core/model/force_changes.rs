@@ -74,7 +74,7 @@ impl ForceChangeBounds {
         let (g, r) = (machine.gravity_m_s2.norm(), joints.radius_m);
         let arms = joints.triples.unpack_vectors(&joints.platform);
         let center = arms.iter().sum::<Vector3<f64>>() / LEGS as f64;
-        let arm = arms.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let arm_m = arms.iter().map(Vector3::norm).fold(0.0, f64::max);
         let (mass, inertia) = (platform.mass_kg, platform.inertia.norm());
         let com = platform.center_of_mass_m.norm();
         let com_arm = (platform.center_of_mass_m - center).norm() / r;
@@ -93,14 +93,14 @@ impl ForceChangeBounds {
             whole: [
                 (mass * com_wrench + wrench_sum * legs.weight) * g,
                 mass * com_wrench + wrench_sum * legs.inertia,
-                mass * com * com_wrench + inertia / r + wrench_sum * legs.inertia * arm,
+                mass * com * com_wrench + inertia / r + wrench_sum * legs.inertia * arm_m,
             ],
             by_turn: [
                 (mass * com_arm + arm_sum * legs.weight) * g,
                 mass * com_arm + arm_sum * legs.inertia,
                 mass * com * (com_arm + com_wrench)
                     + 2.0 * inertia / r
-                    + (arm_sum + wrench_sum) * legs.inertia * arm,
+                    + (arm_sum + wrench_sum) * legs.inertia * arm_m,
             ],
             by_turned_leg: [
                 wrench_sum * (legs.weight + legs.weight_change) * g,
@@ -108,11 +108,11 @@ impl ForceChangeBounds {
             ],
             by_velocity: [
                 [
-                    mass * com * com_wrench + inertia / r + wrench_sum * legs.inertia * arm,
+                    mass * com * com_wrench + inertia / r + wrench_sum * legs.inertia * arm_m,
                     wrench_sum * 2.0 * legs.coriolis / length,
                 ],
                 [
-                    axial_mass * arm,
+                    axial_mass * arm_m,
                     actuator.reflected_mass_kg / length
                         + machine.rod.mass_kg * machine.rod.center_of_mass_m / (length * length),
                 ],
@@ -122,7 +122,7 @@ impl ForceChangeBounds {
             viscous_friction: actuator.largest_viscous_friction(),
             coulomb_friction: actuator.largest_coulomb_friction(),
             max_rate_m_s: actuator.max_rate_m_s,
-            arm_m: arm,
+            arm_m,
         }
     }
 
@@ -137,24 +137,20 @@ impl ForceChangeBounds {
 
     /// Changes of the forces under accelerations, and forces of velocities.
     pub fn moving(&self, motion: &LargestMotion, turn_rad: f64, turned_leg: f64) -> ForceBound {
-        let LargestMotion {
-            angular_rad_s2: angular,
-            linear_m_s2: linear,
-            angular_velocity_rad_s: angular_velocity,
-            velocity_m_s: velocity,
-        } = *motion;
-        let turning = angular_velocity * angular_velocity;
-        let joint_acceleration = linear + self.arm_m * angular;
-        let joint_speed = velocity + self.arm_m * angular_velocity;
+        let LargestMotion { angular_rad_s2, linear_m_s2, angular_velocity_rad_s, velocity_m_s } = *motion;
+        let turning = angular_velocity_rad_s * angular_velocity_rad_s;
+        let joint_acceleration = linear_m_s2 + self.arm_m * angular_rad_s2;
+        let joint_speed = velocity_m_s + self.arm_m * angular_velocity_rad_s;
         let joint = joint_speed * joint_speed;
         let ([_, by_linear, by_angular], [_, by_joint]) = (self.by_turn, self.by_turned_leg);
         let [[wrench, joint_wrench], [axial, joint_axial]] = self.by_velocity;
         ForceBound {
-            wrench: (by_linear * linear + by_angular * angular) * turn_rad
+            wrench: (by_linear * linear_m_s2 + by_angular * angular_rad_s2) * turn_rad
                 + by_joint * joint_acceleration * turned_leg
                 + wrench * turning
                 + joint_wrench * joint,
-            axial_n: self.axial_mass * (joint_acceleration * turned_leg + self.arm_m * angular * turn_rad)
+            axial_n: self.axial_mass
+                * (joint_acceleration * turned_leg + self.arm_m * angular_rad_s2 * turn_rad)
                 + axial * turning
                 + joint_axial * joint
                 + self.viscous_friction * joint_speed.min(self.max_rate_m_s),

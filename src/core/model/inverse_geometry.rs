@@ -74,9 +74,9 @@ impl<S: Simd> LegGeometry<S> {
         arm: Lanes3<f64x8<S>>,
     ) -> Self {
         let s = position + arm - base;
-        let length = s.dot(s).sqrt();
-        let inverse_length = f64x8::splat(simd, 1.0) / length;
-        Self { arm, direction: s * inverse_length, length_m: length, inverse_length_per_m: inverse_length }
+        let length_m = s.dot(s).sqrt();
+        let inverse_length_per_m = f64x8::splat(simd, 1.0) / length_m;
+        Self { arm, direction: s * inverse_length_per_m, length_m, inverse_length_per_m }
     }
 
     /// Smallest sine of a leg's angle to its universal joint, see [`universal_sine`].
@@ -96,9 +96,9 @@ impl<S: Simd> LegGeometry<S> {
     #[inline(always)]
     pub fn velocity_in_lanes(&self, angular: Lanes3<f64x8<S>>, linear: Lanes3<f64x8<S>>) -> LegVelocity<S> {
         let joint = linear + angular.cross(self.arm);
-        let rate = self.direction.dot(joint);
-        let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length_per_m;
-        LegVelocity { rate_m_s: rate, direction }
+        let rate_m_s = self.direction.dot(joint);
+        let direction = joint.plus_scaled(-rate_m_s, self.direction) * self.inverse_length_per_m;
+        LegVelocity { rate_m_s, direction }
     }
 
     /// Joint accelerations aB, with `acceleration_map` from [`super::platform::acceleration_map`].

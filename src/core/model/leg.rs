@@ -179,11 +179,11 @@ impl<S: Simd> LegReaction<S> {
         }
         // n' and the spin are already normal to n: projecting them as well costs nothing.
         transverse = transverse.minus_scaled(transverse.dot(n) * load(&constants.legs_only), n);
-        let mut axial = m2 * (joint_acceleration - gravity).dot(n);
+        let mut axial_n = m2 * (joint_acceleration - gravity).dot(n);
         if M::VELOCITY {
-            axial = m2_e2.fused_mul_add(n_rate.dot(n_rate), axial);
+            axial_n = m2_e2.fused_mul_add(n_rate.dot(n_rate), axial_n);
         }
-        Self { transverse, axial_n: axial }
+        Self { transverse, axial_n }
     }
 }
 

@@ -136,22 +136,22 @@ impl Joints {
             *direction = (home.position + home.rotation * joint - *direction).normalize();
         }
         let triples = Triples::best(&directions);
-        let center = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
-        let around_center = platform.map(|b| b - center);
+        let center_m = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
+        let around_center = platform.map(|b| b - center_m);
         let mean_square = around_center.iter().map(Vector3::norm_squared).sum::<f64>() / LEGS as f64;
-        let radius = mean_square.sqrt();
+        let radius_m = mean_square.sqrt();
         Self {
             triples,
             base: triples.pack_vectors(base),
             platform: triples.pack_vectors(platform),
             universal_axis: triples.pack_vectors(universal_axis),
-            radius_m: radius,
-            radius_cubed_m3: radius * radius * radius,
-            inverse_radius_cubed_per_m3: triples.parity() / (radius * radius * radius),
-            center_m: center,
+            radius_m,
+            radius_cubed_m3: radius_m * radius_m * radius_m,
+            inverse_radius_cubed_per_m3: triples.parity() / (radius_m * radius_m * radius_m),
+            center_m,
             around_center: triples.pack_vectors(&around_center),
-            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)),
-            arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)),
+            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius_m)),
+            arm_curvature: triples.pack(&around_center.map(|b| radius_m + b.norm_squared() / radius_m)),
         }
     }
 

@@ -163,12 +163,12 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     let [platform, axes] =
         [&joints.platform, &joints.universal_axis].map(|lanes| joints.triples.unpack_vectors(lanes));
     let directions = leg_directions(machine, &motion.pose);
-    let LegMotion { length_m: length, rate_m_s: rate, accel_m_s2: accel } = leg_motion(machine, motion);
+    let LegMotion { length_m, rate_m_s, accel_m_s2 } = leg_motion(machine, motion);
     let map = acceleration_map(&motion.twist, &motion.acceleration);
 
     let mut wrenches = Regressor::zeros();
     add_platform(&mut wrenches, machine, motion, &map);
-    let per_leg = length.into_iter().zip(rate).zip(accel);
+    let per_leg = length_m.into_iter().zip(rate_m_s).zip(accel_m_s2);
     for (((joint, n), u), ((length, rate), accel)) in platform.iter().zip(&directions).zip(&axes).zip(per_leg)
     {
         let arm = motion.pose.rotation * joint;
@@ -181,9 +181,9 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     }
 
     let mut forces = leg_wrenches(machine, &motion.pose).lu().solve(&wrenches)?;
-    forces.set_column(REFLECTED, &Vector6::from(accel));
-    forces.fixed_view_mut::<6, 6>(0, VISCOUS).set_diagonal(&Vector6::from(rate));
-    let signs = Vector6::from(rate.map(|rate| machine.actuator.sign(rate)));
+    forces.set_column(REFLECTED, &Vector6::from(accel_m_s2));
+    forces.fixed_view_mut::<6, 6>(0, VISCOUS).set_diagonal(&Vector6::from(rate_m_s));
+    let signs = Vector6::from(rate_m_s.map(|rate| machine.actuator.sign(rate)));
     forces.fixed_view_mut::<6, 6>(0, COULOMB).set_diagonal(&signs);
     Some(forces)
 }

@@ -62,7 +62,7 @@ mod tests {
             xd: Vector6::repeat(-1.0 + 3.0 * t.powi(2) - t.powi(4)),
             xdd: Vector6::repeat(6.0 * t - 4.0 * t.powi(3)),
         };
-        let knots = [0.0, 0.3, 1.1, 2.0].map(|t| Knot { t_s: t, state: exact(t) });
+        let knots = [0.0, 0.3, 1.1, 2.0].map(|t_s| Knot { t_s, state: exact(t_s) });
         for k in 0..=20 {
             let t = 0.1 * f64::from(k);
             let (found, wanted) = (interpolate(&knots, t).unwrap(), exact(t));

@@ -61,19 +61,17 @@ impl Hardware {
     /// Lengths \[m\] and rates \[m/s\] as the sensors measure them now. Each reading draws its own noise.
     pub fn measure(&mut self) -> ([f64; LEGS], [f64; LEGS]) {
         let legs = self.simulator.leg_motion();
-        let SensorErrors {
-            length_step_m: length_step,
-            rate_step_m_s: rate_step,
-            length_noise_m: length_noise,
-            rate_noise_m_s: rate_noise,
-        } = self.sensor;
+        let SensorErrors { length_step_m, rate_step_m_s, length_noise_m, rate_noise_m_s } = self.sensor;
         let mut read = |values: [f64; LEGS], noise: f64, step: f64| {
             values.map(|value| {
                 let noise = if noise > 0.0 { noise * self.random.gaussian() } else { 0.0 };
                 rounded(value + noise, step)
             })
         };
-        (read(legs.length_m, length_noise, length_step), read(legs.rate_m_s, rate_noise, rate_step))
+        (
+            read(legs.length_m, length_noise_m, length_step_m),
+            read(legs.rate_m_s, rate_noise_m_s, rate_step_m_s),
+        )
     }
 }
 

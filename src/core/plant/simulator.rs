@@ -98,16 +98,16 @@ impl Simulator {
         let terms = PlantTerms::choose(machine, wanted, max_step_s, tolerance_m);
         let machine = terms.machine(machine);
         let home = TaskState::at_rest(machine.home).motion();
-        let mut length = Vector6::from(leg_lengths(&machine, &home.pose));
+        let mut length_m = Vector6::from(leg_lengths(&machine, &home.pose));
         if let (Some((spring, _)), Some(load)) = (terms.elastic, inverse_dynamics::<Exact>(&machine, &home)) {
-            length += Vector6::from(load.map(|force| spring.deflection(force)));
+            length_m += Vector6::from(load.map(|force| spring.deflection(force)));
         }
         Self {
             dynamics: ForwardDynamics::new(&machine),
             terms,
             state: PlantState {
                 platform: BodyState { pose: home.pose, twist: Twist::default() },
-                drives: DriveStates { length_m: length, rate_m_s: Vector6::zeros() },
+                drives: DriveStates { length_m, rate_m_s: Vector6::zeros() },
             },
             brakes: Brakes::Closed,
             deceleration: deceleration_m_s2,
@@ -169,8 +169,8 @@ impl Simulator {
         for _ in 0..steps {
             match (self.brakes, force) {
                 (Brakes::Open, Some(force)) => self.drive(force, step),
-                (Brakes::Closing { rates_m_s: rates, elapsed_s: elapsed, duration_s: duration }, _) => {
-                    self.brake(&rates, elapsed, duration, step)
+                (Brakes::Closing { rates_m_s, elapsed_s, duration_s }, _) => {
+                    self.brake(&rates_m_s, elapsed_s, duration_s, step)
                 }
                 _ => {}
             }
@@ -209,16 +209,16 @@ impl Simulator {
     }
 
     fn close_brakes(&mut self) {
-        let rates = legs(self.machine(), &self.state).rate_m_s;
-        let duration = Vector6::from(rates).amax() / self.deceleration;
+        let rates_m_s = legs(self.machine(), &self.state).rate_m_s;
+        let duration_s = Vector6::from(rates_m_s).amax() / self.deceleration;
         self.push = [0.0; LEGS];
-        self.brakes = Brakes::Closing { rates_m_s: rates, elapsed_s: 0.0, duration_s: duration };
+        self.brakes = Brakes::Closing { rates_m_s, elapsed_s: 0.0, duration_s };
     }
 
     /// The legs follow their deceleration; the platform follows the legs (midpoint rule).
-    fn brake(&mut self, rates: &[f64; LEGS], elapsed: f64, duration: f64, step: f64) {
+    fn brake(&mut self, rates: &[f64; LEGS], elapsed: f64, duration_s: f64, step: f64) {
         let twist_at = |time: f64, pose| {
-            let share = (1.0 - time / duration).max(0.0);
+            let share = (1.0 - time / duration_s).max(0.0);
             twist_from_rates(self.machine(), pose, &rates.map(|rate| rate * share)).unwrap_or_default()
         };
         let scaled = |twist: Twist, dt: f64| Twist { angular: twist.angular * dt, linear: twist.linear * dt };
@@ -227,14 +227,14 @@ impl Simulator {
         let middle_pose = before.displaced(&scaled(start, 0.5 * step));
         let middle = twist_at(elapsed + 0.5 * step, &middle_pose);
         let pose = before.displaced(&scaled(middle, step));
-        let elapsed = elapsed + step;
-        let standing = !(elapsed < duration);
-        let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
+        let elapsed_s = elapsed + step;
+        let standing = !(elapsed_s < duration_s);
+        let twist = if standing { Twist::default() } else { twist_at(elapsed_s, &pose) };
         self.carry_drives(BodyState { pose, twist });
         self.brakes = if standing {
             Brakes::Closed
         } else {
-            Brakes::Closing { rates_m_s: *rates, elapsed_s: elapsed, duration_s: duration }
+            Brakes::Closing { rates_m_s: *rates, elapsed_s, duration_s }
         };
     }
 

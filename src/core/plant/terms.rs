@@ -64,9 +64,9 @@ impl PlantTerms {
         let depends = wanted.drive.bandwidth_hz.is_some() || wanted.leg.is_some() || wanted.friction.any();
         let leg_mass = if depends || dry > 0.0 { least_mass(machine) } else { f64::NAN };
         let drive_mass = actuator.reflected_mass_kg;
-        let mut step = longest_step_s;
+        let mut step_s = longest_step_s;
         let mut limit = |rate: f64, effect: f64, divisor: f64| {
-            step = step.min((divisor * tolerance_m / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
+            step_s = step_s.min((divisor * tolerance_m / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
         };
 
         let deflection =
@@ -87,22 +87,22 @@ impl PlantTerms {
         }
         let way = |rate: f64| actuator.max_force_n / (moved * rate * rate);
         let lag_rate = wanted.drive.bandwidth_hz.map(|hertz| core::f64::consts::TAU * hertz);
-        let lag = lag_rate.filter(|rate| way(*rate) > tolerance_m);
-        if let Some(rate) = lag {
+        let lag_per_s = lag_rate.filter(|rate| way(*rate) > tolerance_m);
+        if let Some(rate) = lag_per_s {
             limit(rate, way(rate), 2880.0);
         }
         let viscous = friction.iter().map(|friction| friction.viscous_n_s_m).fold(0.0, f64::max);
         if viscous > 0.0 {
-            step = step.min(MAX_STEP_TIMES_RATE * moved / viscous);
+            step_s = step_s.min(MAX_STEP_TIMES_RATE * moved / viscous);
         }
         Self {
-            lag_per_s: lag,
+            lag_per_s,
             elastic: spring.map(|spring| (spring, drive_mass)),
-            step_s: step,
+            step_s,
             friction,
             // Dry friction acts within smoothing / (force / mass); where that is too fast for the step, its sign
             // is smoothed just enough for a stable integration.
-            smoothing: Actuator::COULOMB_SMOOTHING_M_S.max(dry * step / moved),
+            smoothing: Actuator::COULOMB_SMOOTHING_M_S.max(dry * step_s / moved),
             external: wanted.external,
         }
     }
@@ -138,10 +138,10 @@ impl PlantTerms {
         let mut force = *push_n;
         let mut drives_accelerate = Vector6::zeros();
         if let Some((spring, drive_mass)) = self.elastic {
-            let LegMotion { length_m: length, rate_m_s: rate, .. } = legs(dynamics.machine(), state);
+            let LegMotion { length_m, rate_m_s, .. } = legs(dynamics.machine(), state);
             force = Transmission::new(actuator, drives.rate_m_s.as_ref()).leg_forces(push_n);
             let on_drives = drives.length_m.iter().zip(&drives.rate_m_s).zip(&mut drives_accelerate);
-            let on_rods = force.iter_mut().zip(&self.friction).zip(length.iter().zip(&rate));
+            let on_rods = force.iter_mut().zip(&self.friction).zip(length_m.iter().zip(&rate_m_s));
             for (((force, friction), (length, rate)), ((drive, drive_rate), accelerates)) in
                 on_rods.zip(on_drives)
             {

@@ -283,7 +283,7 @@ fn legs(snapshot: &Snapshot, now_ns: u64, timeout_s: f64) -> Vec<LegReport> {
     let rates = measurement.rate_m_s.filter(|_| is_new).map_or([None; LEGS], |rate| rate.map(Some));
     let numbers = measurement.length_m.iter().zip(rates).zip(&snapshot.command_n).take(LEGS);
     numbers
-        .map(|((length, rate), force)| LegReport { length_m: *length, rate_m_s: rate, force_n: *force })
+        .map(|((length, rate_m_s), force)| LegReport { length_m: *length, rate_m_s, force_n: *force })
         .collect()
 }
 

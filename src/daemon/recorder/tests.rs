@@ -32,9 +32,9 @@ fn loaded(gains: &str) -> Loaded {
 fn input(machine: &Machine, cycle: u64) -> Input {
     let mut x = machine.home;
     x[3] += 1e-3 * (cycle as f64 * 0.01).sin();
-    let length = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
+    let length_m = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
     let release_ns = cycle * 1_000_000;
-    let measurement = Some(Measurement { time_ns: release_ns, length_m: length, ..Measurement::default() });
+    let measurement = Some(Measurement { time_ns: release_ns, length_m, ..Measurement::default() });
     Input { release_ns, measurement, ..Input::default() }
 }
 

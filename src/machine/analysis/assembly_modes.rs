@@ -105,9 +105,9 @@ pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
 /// singular, because each of them is then the only one with its lengths. Examined are the straight ways of the lengths to
 /// the 64 corners of the stroke, not those in between.
 fn is_confined(machine: &Machine, here: &KinematicState) -> bool {
-    let Actuator { min_length_m: min_length, max_length_m: max_length, .. } = machine.actuator;
+    let Actuator { min_length_m, max_length_m, .. } = machine.actuator;
     (0..1_u32 << LEGS).all(|corner| {
-        let end = |leg: usize| if corner & (1 << leg) == 0 { min_length } else { max_length };
+        let end = |leg: usize| if corner & (1 << leg) == 0 { min_length_m } else { max_length_m };
         let mut tracker = Tracker::new(machine, *here.pose());
         tracker.find(machine, &core::array::from_fn(end)).0 == TrackingResult::Found
     })

@@ -39,14 +39,14 @@ impl FidelitySample {
         let motion = state.motion();
         let of = |fidelity| model.forces_of(fidelity, &motion).filter(|f| f.iter().all(|f| f.is_finite()));
         let exact = of(Fidelity::Exact).ok_or(NotEvaluated::Singular)?;
-        let mut errors = [[0.0; LEGS]; FIDELITY_COUNT];
-        for (errors, fidelity) in errors.iter_mut().zip(Fidelity::ALL) {
+        let mut errors_n = [[0.0; LEGS]; FIDELITY_COUNT];
+        for (errors, fidelity) in errors_n.iter_mut().zip(Fidelity::ALL) {
             let forces = of(fidelity).ok_or(NotEvaluated::Singular)?;
             for (error, (force, exact)) in errors.iter_mut().zip(forces.iter().zip(&exact)) {
                 *error = (force - exact).abs();
             }
         }
-        Ok(Self { peak_n: largest(&exact), errors_n: errors })
+        Ok(Self { peak_n: largest(&exact), errors_n })
     }
 }
 

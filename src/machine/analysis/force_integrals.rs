@@ -47,10 +47,10 @@ pub(super) struct ForceIntegrals(Vec<HeldForce>);
 impl ForceIntegrals {
     pub fn new(sent: &[SentForce], zero_ns: u64) -> Self {
         let mut held: Vec<HeldForce> = vec![];
-        for SentForce { release_ns, force_n: force } in sent {
+        for SentForce { release_ns, force_n } in sent {
             let begin = (release_ns - zero_ns) as f64 * 1e-9;
             let [first, second] = held.last().map_or([Vector6::zeros(); 2], |last| last.at(begin));
-            held.push(HeldForce { begin, force: (*force).into(), first, second });
+            held.push(HeldForce { begin, force: (*force_n).into(), first, second });
         }
         Self(held)
     }

@@ -36,17 +36,17 @@ impl SampledLoop {
     }
 
     /// Whether a loop with `periods` times the true period is stable with a known delay, in its own periods.
-    fn is_stable_with_coarse(&self, periods: f64, known_delay: f64, masses: &[f64]) -> bool {
+    fn is_stable_with_coarse(&self, periods: f64, known_delay_periods: f64, masses: &[f64]) -> bool {
         let unknown = (self.delay_periods - self.known_delay_periods) / periods;
-        let rate_noise = self.rate_noise_ratio.map(|noise| noise * periods);
+        let rate_noise_ratio = self.rate_noise_ratio.map(|noise| noise * periods);
         let wn_t = self.wn_t * periods;
-        let held_pole = self.held_pole_t * periods;
+        let held_pole_t = self.held_pole_t * periods;
         let late = Self {
             wn_t,
-            rate_noise_ratio: rate_noise,
-            held_pole_t: held_pole,
-            known_delay_periods: known_delay,
-            delay_periods: known_delay + unknown,
+            rate_noise_ratio,
+            held_pole_t,
+            known_delay_periods,
+            delay_periods: known_delay_periods + unknown,
             ..*self
         };
         masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))

@@ -81,7 +81,7 @@ mod tests {
             }
         };
         let mut knots = [0.0, 0.1, 0.7, 0.75, 1.2, 1.9, 2.0]
-            .map(|t| Knot { t_s: t, state: TaskState::at_rest(exact(t).x.into()) });
+            .map(|t_s| Knot { t_s, state: TaskState::at_rest(exact(t_s).x.into()) });
         complete(&mut knots).unwrap();
         for k in 0..=40 {
             let t = 0.05 * f64::from(k);
@@ -107,8 +107,8 @@ mod tests {
         };
         let mut knots: Vec<_> = (0..count)
             .map(|k| {
-                let t = h * f64::from(k);
-                Knot { t_s: t, state: TaskState::at_rest([exact(t)[0]; 6]) }
+                let t_s = h * f64::from(k);
+                Knot { t_s, state: TaskState::at_rest([exact(t_s)[0]; 6]) }
             })
             .collect();
         complete(&mut knots).unwrap();

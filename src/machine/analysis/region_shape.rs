@@ -55,11 +55,11 @@ impl RegionShape {
     pub fn size(&self, cell: &PoseCell) -> Option<f64> {
         let nearest = cell.nearest();
         match self {
-            Self::Ball { turn_rad: turn } => {
+            Self::Ball { turn_rad } => {
                 let [a, b, c, ..] = cell.middle;
                 let middle = log(&turned([a, b, c])).norm();
                 // 1e-12 for rounding, so that a cell on the edge is not left out.
-                let within = middle - cell.turn() <= turn * (1.0 + 1e-12);
+                let within = middle - cell.turn() <= turn_rad * (1.0 + 1e-12);
                 let [.., x, y, z] = nearest;
                 within.then(|| Vector3::new(x, y, z).norm())
             }
@@ -77,10 +77,10 @@ impl RegionShape {
     /// Parameters on the edge of the region of size 1, angles included, from six numbers in \[-1, 1\].
     pub fn edge(&self, numbers: &[f64; 6]) -> [f64; 6] {
         match self {
-            Self::Ball { turn_rad: turn } => {
+            Self::Ball { turn_rad } => {
                 let [a, b, c, x, y, z] = *numbers;
                 let unit = |v: Vector3<f64>| v.try_normalize(0.0).unwrap_or_else(Vector3::x);
-                let rotation = exp(&(unit(Vector3::new(a, b, c)) * *turn));
+                let rotation = exp(&(unit(Vector3::new(a, b, c)) * *turn_rad));
                 let position = unit(Vector3::new(x, y, z));
                 task_coordinates(&Pose { rotation, position }, &[0.0; 6])
             }

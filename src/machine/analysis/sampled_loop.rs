@@ -148,14 +148,14 @@ impl<'a> Period<'a> {
             wn_t,
             damping_ratio,
             compensates_disturbance,
-            known_delay_periods: known_delay,
-            delay_periods: delay,
+            known_delay_periods,
+            delay_periods,
             mass_ratio,
-            held_pole_t: held_pole,
+            held_pole_t,
             ..
         } = *self.of;
         let at = |k: usize| z.get(k).copied().unwrap_or_default();
-        let mut platform = Axis { e: at(0), v: at(1), d: 0.0, pole: held_pole };
+        let mut platform = Axis { e: at(0), v: at(1), d: 0.0, pole: held_pole_t };
         let mut estimate = Axis { e: at(2), v: at(3), d: at(4), pole: 0.0 };
         let correct = |[by_e, by_v, by_d]: KalmanGains, innovation: f64, estimate: &mut Axis| {
             estimate.e += by_e * innovation;
@@ -167,7 +167,7 @@ impl<'a> Period<'a> {
         correct(of_rate, platform.v + noise[1] - estimate.v, &mut estimate);
         let residual = platform.e + noise[0] - estimate.e;
         let mut begin = estimate;
-        begin.advance(known_delay, known_delay, |ago| at(4 + ago));
+        begin.advance(known_delay_periods, known_delay_periods, |ago| at(4 + ago));
         let mut newest = wn_t * wn_t * begin.e + 2.0 * damping_ratio * wn_t * begin.v;
         if compensates_disturbance {
             newest += begin.d;
@@ -177,9 +177,10 @@ impl<'a> Period<'a> {
         let mut middle = begin;
         middle.step(0.5, middle.d - newest);
         let pose = |ago: usize| if ago == 0 { middle.e + residual } else { at(4 + self.pending + ago) };
-        estimate.advance(1.0, known_delay, u);
-        let pole_squared = held_pole * held_pole;
-        platform.advance(1.0, delay, |ago| (u(ago) + push(ago)) / mass_ratio + pole_squared * pose(ago));
+        estimate.advance(1.0, known_delay_periods, u);
+        let pole_squared = held_pole_t * held_pole_t;
+        platform
+            .advance(1.0, delay_periods, |ago| (u(ago) + push(ago)) / mass_ratio + pole_squared * pose(ago));
         let head = [platform.e, platform.v, estimate.e, estimate.v, estimate.d];
         let (commands, poses) = ((0..self.pending).map(u), (0..self.pending).map(pose));
         DVector::from_iterator(
@@ -301,7 +302,7 @@ impl SampledLoop {
 
     /// The longest stable delay, in periods, at most [`MAX_DELAY_PERIODS`]. Its known part stays as it is.
     pub fn longest_delay(&self) -> f64 {
-        let with = |delay| Self { delay_periods: delay, ..*self }.is_stable();
+        let with = |delay_periods| Self { delay_periods, ..*self }.is_stable();
         let longest = MAX_DELAY_PERIODS as f64;
         if with(longest) { longest } else { edge(self.known_delay_periods, longest, with) }
     }

@@ -32,7 +32,7 @@ fn loops_of(
     limits: &DeploymentLimits,
 ) -> Vec<ControlLoop> {
     // Modes on legs compute the forces at the desired pose.
-    let held_pole = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole_per_s };
+    let held_pole_t = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole_per_s };
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
@@ -49,7 +49,7 @@ fn loops_of(
         sampled: SampledLoop {
             estimator_ratio: control.estimator_bandwidth_hz / bandwidth_hz,
             compensates_disturbance: control.compensate_disturbances,
-            held_pole_t: held_pole * realtime.period_s(),
+            held_pole_t: held_pole_t * realtime.period_s(),
             ..realtime.sampled_loop(bandwidth_hz, damping_ratio, drive.total_delay_s())
         }
         .with_feedback_gain(gain),
@@ -99,15 +99,8 @@ pub(super) fn bounded_age_s(
 
 /// Whether the values from which the loop follows were all accepted.
 fn is_finite(sampled: &SampledLoop) -> bool {
-    let SampledLoop {
-        wn_t,
-        damping_ratio,
-        estimator_ratio,
-        delay_periods: delay,
-        held_pole_t: held_pole,
-        ..
-    } = *sampled;
-    let values = [wn_t, damping_ratio, estimator_ratio, delay, held_pole];
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, delay_periods, held_pole_t, .. } = *sampled;
+    let values = [wn_t, damping_ratio, estimator_ratio, delay_periods, held_pole_t];
     values.iter().all(|value| value.is_finite())
 }
 
@@ -127,7 +120,7 @@ impl ControlLoop {
     /// Error if the loop is unstable because of the pole of the platform under constant forces.
     pub fn beyond_held_pole(&self) -> Option<String> {
         let Self { name, rate_hz, sampled, .. } = self;
-        let with = |held_pole| SampledLoop { held_pole_t: held_pole, ..*sampled }.is_stable();
+        let with = |held_pole_t| SampledLoop { held_pole_t, ..*sampled }.is_stable();
         if with(sampled.held_pole_t) || !with(0.0) {
             return None;
         }

@@ -82,11 +82,11 @@ pub(super) fn exchanged_home(machine: &Machine) -> Option<ExchangedHome> {
     };
     let [alpha, beta, gamma, x, y, z] = machine.home;
     let pose = [x, y, z, alpha, beta, gamma];
-    let [margin_at_home, exchanged] = [machine.home, pose].map(margin);
+    let [margin_at_home_m, exchanged] = [machine.home, pose].map(margin);
     let is_unusual =
         Vector3::new(x, y, z).norm() < MAX_EXCHANGED_RATIO * Vector3::new(alpha, beta, gamma).norm();
-    (exchanged > margin_at_home.max(0.0) && (margin_at_home < 0.0 || is_unusual))
-        .then_some(ExchangedHome { pose, margin_at_home_m: margin_at_home })
+    (exchanged > margin_at_home_m.max(0.0) && (margin_at_home_m < 0.0 || is_unusual))
+        .then_some(ExchangedHome { pose, margin_at_home_m })
 }
 
 /// Root mean square distances of points from their mean.

@@ -51,8 +51,8 @@ pub(super) struct LegSection<'t> {
 
 /// Reads and checks the machine. Rejected values are NaN.
 pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
-    let gravity = Vector3::from(root.vector("gravity_m_s2"));
-    if gravity.norm() > MAX_GRAVITY_M_S2 {
+    let gravity_m_s2 = Vector3::from(root.vector("gravity_m_s2"));
+    if gravity_m_s2.norm() > MAX_GRAVITY_M_S2 {
         root.reject("gravity_m_s2", format!("must be at most {MAX_GRAVITY_M_S2} long"));
     }
     let platform = platform(root.section("platform"));
@@ -63,7 +63,7 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
     let rod = link(root.section("rod"), &actuator);
     let mut home = root.section("home");
     let home_pose = home.vector("pose");
-    let max_rotation =
+    let max_rotation_rad =
         home.number_or("max_rotation_deg", USUAL_ROTATION_DEG, ROTATION_BOUND_DEG).to_radians();
     let legs: Vec<LegSection> = root.rows("leg", LEGS).into_iter().map(leg).collect();
     let of_leg = |member: fn(&LegSection) -> Vector3<f64>| -> [Vector3<f64>; LEGS] {
@@ -76,14 +76,14 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
         &TaskState::at_rest(home_pose).motion().pose,
     );
     let mut machine = Machine {
-        gravity_m_s2: gravity,
+        gravity_m_s2,
         platform,
         joints,
         cylinder,
         rod,
         actuator,
         home: home_pose,
-        max_rotation_rad: max_rotation,
+        max_rotation_rad,
         level,
     };
     if !is_friction_stated {
@@ -94,8 +94,8 @@ pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
 }
 
 fn platform(mut section: SectionReader) -> Platform {
-    let mass = section.number("mass_kg", Bound::Positive);
-    let center_of_mass = Vector3::from(section.vector("center_of_mass_m"));
+    let mass_kg = section.number("mass_kg", Bound::Positive);
+    let center_of_mass_m = Vector3::from(section.vector("center_of_mass_m"));
     let mut tensor = section.section("inertia_kg_m2");
     let [xx, yy, zz] = ["xx", "yy", "zz"].map(|key| tensor.number(key, Bound::Positive));
     let [xy, xz, yz] = ["xy", "xz", "yz"].map(|key| tensor.number_or(key, 0.0, Bound::Finite));
@@ -103,7 +103,7 @@ fn platform(mut section: SectionReader) -> Platform {
     if inertia.iter().all(|x| x.is_finite()) {
         check_inertia(&section, &inertia);
     }
-    Platform { mass_kg: mass, center_of_mass_m: center_of_mass, inertia }
+    Platform { mass_kg, center_of_mass_m, inertia }
 }
 
 /// Checks an inertia tensor: a body of positive masses has `0 < I1 <= I2 <= I3 <= I1 + I2`.
@@ -183,8 +183,8 @@ fn link(mut section: SectionReader, actuator: &Actuator) -> Link {
 fn transverse_inertia(section: &mut SectionReader) -> TransverseInertia {
     const KEY: &str = "transverse_inertia_kg_m2";
     if !section.is_table(KEY) {
-        let constant = section.number(KEY, Bound::NotNegative);
-        return TransverseInertia { constant_kg_m2: constant, quadratic_kg: 0.0, reference_length_m: 0.0 };
+        let constant_kg_m2 = section.number(KEY, Bound::NotNegative);
+        return TransverseInertia { constant_kg_m2, quadratic_kg: 0.0, reference_length_m: 0.0 };
     }
     let mut table = section.section(KEY);
     TransverseInertia {
@@ -196,35 +196,31 @@ fn transverse_inertia(section: &mut SectionReader) -> TransverseInertia {
 
 /// Least transverse inertia of a link over the stroke; NaN if a value that it depends on was rejected.
 fn least_over_stroke(inertia: &TransverseInertia, actuator: &Actuator) -> f64 {
-    let TransverseInertia {
-        constant_kg_m2: constant,
-        quadratic_kg: quadratic,
-        reference_length_m: reference_length,
-    } = *inertia;
+    let TransverseInertia { constant_kg_m2, quadratic_kg, reference_length_m } = *inertia;
     let (shortest, longest) = (actuator.min_length_m, actuator.max_length_m);
-    if quadratic == 0.0 {
-        return constant;
+    if quadratic_kg == 0.0 {
+        return constant_kg_m2;
     }
     if !(shortest..longest).contains(&shortest) {
         return f64::NAN;
     }
     // A parabola is least at an end or at its vertex.
-    let vertex = reference_length.clamp(shortest, longest);
+    let vertex = reference_length_m.clamp(shortest, longest);
     let [a, b, c] =
-        [shortest, vertex, longest].map(|l| constant + quadratic * (l - reference_length).powi(2));
+        [shortest, vertex, longest].map(|l| constant_kg_m2 + quadratic_kg * (l - reference_length_m).powi(2));
     if a.is_finite() { a.min(b).min(c) } else { f64::NAN }
 }
 
 fn leg(mut reader: SectionReader) -> LegSection {
-    let base = Vector3::from(reader.vector("base_m"));
-    let platform = Vector3::from(reader.vector("platform_m"));
+    let base_m = Vector3::from(reader.vector("base_m"));
+    let platform_m = Vector3::from(reader.vector("platform_m"));
     let axis = Vector3::from(reader.vector_or("universal_axis", [0.0, 1.0, 0.0]));
     // Scaled before it is squared, which would leave no digits of a short one.
     let universal_axis = axis.unscale(axis.amax()).normalize();
     if axis.amax() == 0.0 {
         reader.reject("universal_axis", "must not be zero: it is a direction");
     }
-    LegSection { reader, base_m: base, platform_m: platform, universal_axis }
+    LegSection { reader, base_m, platform_m, universal_axis }
 }
 
 /// A number rounded to six significant digits, enough for an error text.

@@ -91,9 +91,8 @@ fn cell(
     rates: Rates,
     watched_s: f64,
 ) -> Cell {
-    let length_noise = if is_quiet { QUIET_NOISE_M } else { NOISE_M };
-    let sensor =
-        SensorErrors { length_noise_m: length_noise, length_step_m: STEP_M, ..SensorErrors::default() };
+    let length_noise_m = if is_quiet { QUIET_NOISE_M } else { NOISE_M };
+    let sensor = SensorErrors { length_noise_m, length_step_m: STEP_M, ..SensorErrors::default() };
     let imperfections = Imperfections { seed: 3, sensor, ..Imperfections::default() };
     let mut control = Rig::imperfect(config, &config.machine, &imperfections);
     control.rates = rates;

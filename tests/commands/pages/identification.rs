@@ -43,7 +43,7 @@ fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -
         let share = 1.0 + drift * 1e-9 * (number * PERIOD_NS) as f64;
         truth.actuator.coulomb_friction_n = coulomb.map(|force| share * force);
         let forces = inverse_dynamics::<Exact>(&truth, &motion).unwrap();
-        let (pose, length) = (motion.pose, leg_lengths(&config.machine, &motion.pose));
+        let (pose, length_m) = (motion.pose, leg_lengths(&config.machine, &motion.pose));
         let platform =
             PlatformState { pose, twist: motion.twist, condition: 1.0, time_to_singularity_s: f64::INFINITY };
         let output = Output {
@@ -53,8 +53,7 @@ fn write(folder: &Folder, cycles: u64, drift: f64, motion: &mut dyn FnMut(f64) -
             reference: Some(motion),
             ..Output::default()
         };
-        let measurement =
-            Some(Measurement { time_ns: release_ns, length_m: length, ..Measurement::default() });
+        let measurement = Some(Measurement { time_ns: release_ns, length_m, ..Measurement::default() });
         let input = Input { release_ns, measurement, ..Input::default() };
         let cycle = CycleMessage { cycle: number, due_ns: release_ns, ..CycleMessage::new(&input, &output) };
         file.write_cycle(&cycle).unwrap();

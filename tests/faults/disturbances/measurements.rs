@@ -16,8 +16,8 @@ pub fn end(m: &mut Moment) {
 
 /// The driver repeats itself with fresh stamps.
 pub fn freeze(m: &mut Moment) {
-    let Measurement { length_m: length, rate_m_s: rate, .. } = m.before.measurement.unwrap();
-    *m.measured() = Measurement { length_m: length, rate_m_s: rate, ..*m.measured() };
+    let Measurement { length_m, rate_m_s, .. } = m.before.measurement.unwrap();
+    *m.measured() = Measurement { length_m, rate_m_s, ..*m.measured() };
 }
 
 pub fn pause_10_ms(m: &mut Moment) {
@@ -117,8 +117,8 @@ pub fn filtered_rates(m: &mut Moment) {
 /// What good encoders do: counts of a micrometre, rates with noise of a millimetre per second.
 pub fn noise_of_encoders(m: &mut Moment) {
     let cycle = m.cycle;
-    let Measurement { length_m: length, rate_m_s: rate, .. } = m.measured();
-    for (leg, (length, rate)) in length.iter_mut().zip(rate.as_mut().unwrap()).enumerate() {
+    let Measurement { length_m, rate_m_s, .. } = m.measured();
+    for (leg, (length, rate)) in length_m.iter_mut().zip(rate_m_s.as_mut().unwrap()).enumerate() {
         *length = (*length * 1e6).round() * 1e-6;
         *rate += 1e-3 * noise(cycle * 6 + leg as u64);
     }

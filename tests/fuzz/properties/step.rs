@@ -210,17 +210,19 @@ impl<'a> Play<'a> {
 
     fn check(&self, output: &Output, request: Option<Request>) {
         let limit = CONFIG.machine.actuator.max_force_n;
-        let Output { state, diagnostic, command_n: force, active_limits, .. } = output;
+        let Output { state, diagnostic, command_n, active_limits, .. } = output;
         if state.has_control() {
-            assert!(force.iter().all(|force| force.abs() <= limit), "{output:?}");
+            assert!(command_n.iter().all(|force| force.abs() <= limit), "{output:?}");
             let most =
                 self.parameters.force_rate_n_s * self.parameters.period_ns as f64 * 1e-9 + ROUNDING * limit;
             if self.last.state.has_control() {
-                let steady =
-                    force.iter().zip(&self.last.command_n).all(|(now, before)| (now - before).abs() <= most);
+                let steady = command_n
+                    .iter()
+                    .zip(&self.last.command_n)
+                    .all(|(now, before)| (now - before).abs() <= most);
                 assert!(steady, "{output:?} after {:?}", self.last);
             }
-            if force.iter().any(|force| force.abs() == limit) {
+            if command_n.iter().any(|force| force.abs() == limit) {
                 assert!(
                     [Limit::Force, Limit::ForceRate].iter().any(|it| active_limits.contains(*it)),
                     "{output:?}"
@@ -228,7 +230,7 @@ impl<'a> Play<'a> {
             }
             assert!(output.platform.is_some() && output.error.is_some(), "{output:?}");
         } else {
-            assert_eq!(force.map(f64::to_bits), [0; 6], "{output:?}");
+            assert_eq!(command_n.map(f64::to_bits), [0; 6], "{output:?}");
         }
         if let Some(PlatformState { pose, twist, .. }) = &output.platform {
             let numbers =

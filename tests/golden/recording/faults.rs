@@ -98,8 +98,8 @@ fn report(m: &mut Moment<'_>) {
     let (enabled, brake_open) = (of_all(force.is_some()), of_all(force.is_some()));
     let measured = m.measured();
     measured.pose = Some(x);
-    let force = Some(force.unwrap_or_default());
-    measured.drives = DriveStatus { enabled, brake_open, fault: Some(0), force_n: force };
+    let force_n = Some(force.unwrap_or_default());
+    measured.drives = DriveStatus { enabled, brake_open, fault: Some(0), force_n };
 }
 
 fn drives_and_external_poses(recorder: &mut Recorder) {

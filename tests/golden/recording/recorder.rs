@@ -247,27 +247,23 @@ impl Recorder {
     }
 
     fn input(&mut self, last: &Input) -> Input {
-        let (length, rate) = self.hardware.measure();
-        let rate = self.has_rates.then_some(rate);
+        let (length_m, rate) = self.hardware.measure();
+        let rate_m_s = self.has_rates.then_some(rate);
         let task =
             (self.source)(self.now_ns).filter(|_| (self.inputs.len() as u64).is_multiple_of(self.interval));
         let setpoint = task.map(|task| {
             let task =
                 if self.kind == SetpointKind::Motion { task } else { TaskState::at_rest(task.x.into()) };
-            let target_speed = self.target_speed;
-            Setpoint {
-                kind: self.kind,
-                target_speed_share: target_speed,
-                ..Setpoint::motion(self.now_ns, task)
-            }
+            let target_speed_share = self.target_speed;
+            Setpoint { kind: self.kind, target_speed_share, ..Setpoint::motion(self.now_ns, task) }
         });
         Input {
             release_ns: self.now_ns + self.phase_ns,
             setpoint: setpoint.or(last.setpoint),
             measurement: Some(Measurement {
                 time_ns: self.now_ns,
-                length_m: length,
-                rate_m_s: rate,
+                length_m,
+                rate_m_s,
                 ..Measurement::default()
             }),
             request: self.asked,
@@ -295,9 +291,9 @@ fn round(input: &mut Input) {
         xd.iter_mut().for_each(|number| to(number, RATE_DIGITS));
         xdd.iter_mut().for_each(|number| to(number, ACCELERATION_DIGITS));
     }
-    if let Some(Measurement { length_m: length, rate_m_s: rate, pose, drives, .. }) = &mut input.measurement {
-        length.iter_mut().chain(pose.iter_mut().flatten()).for_each(|number| to(number, POSE_DIGITS));
-        rate.iter_mut().flatten().for_each(|number| to(number, RATE_DIGITS));
+    if let Some(Measurement { length_m, rate_m_s, pose, drives, .. }) = &mut input.measurement {
+        length_m.iter_mut().chain(pose.iter_mut().flatten()).for_each(|number| to(number, POSE_DIGITS));
+        rate_m_s.iter_mut().flatten().for_each(|number| to(number, RATE_DIGITS));
         drives.force_n.iter_mut().flatten().for_each(|number| to(number, FORCE_DIGITS));
     }
 }

@@ -298,11 +298,11 @@ fn faded(task: &TaskState, from: &Vector6<f64>, t: f64, fade_s: f64) -> TaskStat
     if t >= fade_s {
         return *task;
     }
-    let Profile { value_share: value, rate_per_s: rate, accel_per_s2: accel } = rise(t, fade_s);
+    let Profile { value_share, rate_per_s, accel_per_s2 } = rise(t, fade_s);
     let d = task.x - from;
     TaskState {
-        x: from + d * value,
-        xd: d * rate + task.xd * value,
-        xdd: d * accel + task.xd * (2.0 * rate) + task.xdd * value,
+        x: from + d * value_share,
+        xd: d * rate_per_s + task.xd * value_share,
+        xdd: d * accel_per_s2 + task.xd * (2.0 * rate_per_s) + task.xdd * value_share,
     }
 }

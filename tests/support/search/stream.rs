@@ -148,11 +148,14 @@ impl Stream {
             Shape::Sines => [sine(amplitude, omega, phase), sine(0.3 * amplitude, 1.7 * omega, 0.0)],
             Shape::Circle => [sine(amplitude, omega, phase), sine(amplitude, omega, phase + 0.25 * TAU)],
             Shape::Spiral => {
-                let Profile { value_share: value, rate_per_s: rate, accel_per_s2: accel } =
-                    rise(t, 4.0 * TAU / omega);
+                let Profile { value_share, rate_per_s, accel_per_s2 } = rise(t, 4.0 * TAU / omega);
                 [phase, phase + 0.25 * TAU].map(|phase| {
                     let [x, v, a] = sine(3.0 * amplitude, omega, phase);
-                    [value * x, value * v + rate * x, value * a + 2.0 * rate * v + accel * x]
+                    [
+                        value_share * x,
+                        value_share * v + rate_per_s * x,
+                        value_share * a + 2.0 * rate_per_s * v + accel_per_s2 * x,
+                    ]
                 })
             }
             Shape::Outward => {
@@ -168,11 +171,10 @@ impl Stream {
             Shape::Moves => {
                 let step_s = self.move_s();
                 let index = (t / step_s).floor();
-                let Profile { value_share: value, rate_per_s: rate, accel_per_s2: accel } =
-                    rise(t - index * step_s, step_s);
+                let Profile { value_share, rate_per_s, accel_per_s2 } = rise(t - index * step_s, step_s);
                 [0, 1].map(|axis| {
                     let [from, to] = [0.0, 1.0].map(|next| self.level(index + next, axis));
-                    [from + (to - from) * value, (to - from) * rate, (to - from) * accel]
+                    [from + (to - from) * value_share, (to - from) * rate_per_s, (to - from) * accel_per_s2]
                 })
             }
             Shape::BangBang => {

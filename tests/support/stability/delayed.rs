@@ -78,10 +78,10 @@ pub struct Delayed {
 impl Delayed {
     pub fn new(config: &Config, setup: &Setup) -> Self {
         let parameters = parameters(config, setup);
-        let SampledLoop { delay_periods: delay, mass_ratio, .. } = setup.sampled;
+        let SampledLoop { delay_periods, mass_ratio, .. } = setup.sampled;
         let in_ns = |periods: f64| (periods * parameters.period_ns as f64).round() as u64;
         let mut wanted = Imperfections { seed: 1, sensor: setup.sensor, ..Imperfections::default() };
-        wanted.drive.dead_time_ns = in_ns(delay) - in_ns(setup.age);
+        wanted.drive.dead_time_ns = in_ns(delay_periods) - in_ns(setup.age);
         let mut strong = config.machine.clone();
         strong.actuator.max_force_n = UNLIMITED;
         let plant = &config.deployment.plant;
@@ -104,14 +104,14 @@ impl Delayed {
     pub fn cycle(&mut self) -> (Cycle, Output) {
         let state = *self.hardware.simulator().state();
         let error = state.pose.displacement_to(&self.setpoint.motion().pose).vector();
-        let (length, rate) = self.hardware.measure();
+        let (length_m, rate) = self.hardware.measure();
         let (time_ns, task) = (self.now_ns, self.setpoint);
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
             measurement: Some(Measurement {
                 time_ns,
-                length_m: length,
+                length_m,
                 rate_m_s: Some(rate),
                 ..Measurement::default()
             }),
@@ -153,8 +153,7 @@ impl Delayed {
 fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let FidelityChoice::Fixed(fidelity) = config.deployment.control.fidelity else { panic!("not fixed") };
     let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
-    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise_ratio: rate_noise, .. } =
-        setup.sampled;
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise_ratio, .. } = setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);
     let law = Law::new(
@@ -169,7 +168,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
         law: Law { max_compensated_acceleration: Vector6::repeat(UNLIMITED), ..law },
         noise: NoiseModel {
             bandwidth_rad_s: estimator_ratio * wn,
-            rate_noise_ratio: rate_noise.map(|ratio| ratio * config.deployment.realtime.rate_hz),
+            rate_noise_ratio: rate_noise_ratio.map(|ratio| ratio * config.deployment.realtime.rate_hz),
             period_s: parameters.noise.period_s,
         },
         // What the estimator knows beside the age of the measurement.

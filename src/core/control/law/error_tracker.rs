@@ -233,12 +233,12 @@ fn check_innovation(
 fn measured(
     cycle: &Cycle<'_>,
     desired: &Motion,
-    Located { measurement, rate_m_s: rate, platform }: &Located<'_>,
+    Located { measurement, rate_m_s, platform }: &Located<'_>,
 ) -> (PoseError, ErrorCoordinates) {
     let constants = cycle.constants;
     let error = PoseError::new(desired, &platform.pose, &platform.twist);
     let deviation = match constants.parameters.law.mode.acts_on_legs() {
-        true => ErrorCoordinates::of_legs(constants.machine(), desired, &measurement.length_m, rate),
+        true => ErrorCoordinates::of_legs(constants.machine(), desired, &measurement.length_m, rate_m_s),
         false => ErrorCoordinates::from(&error),
     };
     (error, deviation)

@@ -77,14 +77,15 @@ impl Law {
     ) -> Self {
         let [angular, linear] = [&limits.orientation, &limits.position]
             .map(|limits| COMPENSATED_DISTURBANCE_PER_ACCELERATION_LIMIT * limits.acceleration);
-        let mut max_compensated_disturbance = Vector6::repeat(linear);
+        let mut max_compensated_acceleration = Vector6::repeat(linear);
         match mode {
-            ControlMode::ComputedTorque => max_compensated_disturbance.fixed_rows_mut::<3>(0).fill(angular),
+            ControlMode::ComputedTorque => max_compensated_acceleration.fixed_rows_mut::<3>(0).fill(angular),
             // The model of this mode lacks the weight as well.
             ControlMode::JointPd => {
                 let home = TaskState::at_rest(machine.home).motion();
                 let weight = InverseDynamics::new(machine).forces::<Gravity>(&home).unwrap_or_default();
-                max_compensated_disturbance += Vector6::from(weight).abs().component_div(&leg_masses.mass_kg);
+                max_compensated_acceleration +=
+                    Vector6::from(weight).abs().component_div(&leg_masses.mass_kg);
             }
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
@@ -95,7 +96,7 @@ impl Law {
             orientation,
             compensates_disturbance,
             leg_masses,
-            max_compensated_acceleration: max_compensated_disturbance,
+            max_compensated_acceleration,
         }
     }
 

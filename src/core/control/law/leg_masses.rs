@@ -33,14 +33,14 @@ impl LegMasses {
     pub fn at_home(machine: &Machine) -> Self {
         let home = machine.home_pose();
         let mobility = MassMatrix::new(machine).leg_mobility(&home).unwrap_or(Matrix6::repeat(f64::NAN));
-        let mass = mobility.diagonal().map(f64::recip);
-        let roots = Matrix6::from_diagonal(&mass.map(f64::sqrt));
+        let mass_kg = mobility.diagonal().map(f64::recip);
+        let roots = Matrix6::from_diagonal(&mass_kg.map(f64::sqrt));
         let coupled = roots * mobility * roots;
         // The eigenvalue iteration does not end if an element is not finite.
         if !coupled.iter().all(|element| element.is_finite()) {
-            return Self { mass_kg: mass, softest_mode_gain: f64::NAN, stiffest_mode_gain: f64::NAN };
+            return Self { mass_kg, softest_mode_gain: f64::NAN, stiffest_mode_gain: f64::NAN };
         }
         let gains = coupled.symmetric_eigenvalues();
-        Self { mass_kg: mass, softest_mode_gain: gains.min(), stiffest_mode_gain: gains.max() }
+        Self { mass_kg, softest_mode_gain: gains.min(), stiffest_mode_gain: gains.max() }
     }
 }

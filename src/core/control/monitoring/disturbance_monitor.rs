@@ -114,7 +114,7 @@ pub struct DisturbanceBounds {
 impl DisturbanceBounds {
     /// Bounds of a machine. `arm_m` is the radius that weights angles \[m\].
     pub fn new(machine: &Machine, parameters: &Parameters, input_matrix: &InputMatrix, arm_m: f64) -> Self {
-        let Parameters { law, payload_change_kg, disturbance_step_m_s2: disturbance_step, .. } = parameters;
+        let Parameters { law, payload_change_kg, disturbance_step_m_s2, .. } = parameters;
         let ReadingErrors { deviation_m: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
         let has_weight = expects_forces && machine.gravity_m_s2.norm_squared() > 0.0;
@@ -144,7 +144,7 @@ impl DisturbanceBounds {
         let softest = law.position.kp_per_s2.min(law.orientation.kp_per_s2);
         let softness = (SWING_STIFFNESS / softest).max(1.0);
         let swing = (MIN_SWING_PEAK_TO_PEAK_M * softness * softness).min(MAX_SWING_M);
-        let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step.unwrap_or(0.0) / softest;
+        let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step_m_s2.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
         let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm_m;
         Self {
@@ -157,7 +157,7 @@ impl DisturbanceBounds {
                 f64::INFINITY
             },
             max_sudden_acceleration_m_s2: if expects_forces {
-                disturbance_step.unwrap_or(default_step)
+                disturbance_step_m_s2.unwrap_or(default_step)
             } else {
                 f64::INFINITY
             },

@@ -78,11 +78,11 @@ pub struct FrozenLegBounds {
 impl FrozenLegBounds {
     /// Bounds of a loop with the stiffness Kp \[1/s^2\].
     pub fn new(kp_per_s2: f64, actuator: &Actuator, period_s: f64) -> Self {
-        let friction = FRICTION_REVERSAL * actuator.friction_uncertainty_n;
+        let friction_n = FRICTION_REVERSAL * actuator.friction_uncertainty_n;
         Self {
             motion_m: motion_bound(kp_per_s2),
-            force_n: friction.max(STICTION_RATIO * actuator.max_force_n),
-            friction_n: friction,
+            force_n: friction_n.max(STICTION_RATIO * actuator.max_force_n),
+            friction_n,
             long: (LONG_S / period_s) as u32,
         }
     }
@@ -208,15 +208,10 @@ mod tests {
     fn check(
         sensors: &mut FrozenSensors,
         length: [f64; LEGS],
-        [deviation, resolution]: [f64; 2],
+        [deviation_m, resolution_m]: [f64; 2],
         legs: [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
-        sensors.check(
-            &length,
-            &ReadingErrors { deviation_m: deviation, resolution_m: resolution },
-            &BOUNDS,
-            || legs,
-        )
+        sensors.check(&length, &ReadingErrors { deviation_m, resolution_m }, &BOUNDS, || legs)
     }
 
     /// Readings of a crawling leg that does not move while the feedback force on it grows to `newtons`.

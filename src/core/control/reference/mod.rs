@@ -316,15 +316,10 @@ impl ReferenceGenerator {
             let (Acceleration { angular, linear }, effort) =
                 self.proposed(constants, target, &desired, step_s);
             step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
-            let Self { strength, .. } = *self;
+            let Self { strength: strength_share, .. } = *self;
             let inner_speeds = inner_speeds(&begin, &self.motion, step_s);
-            let step = Step {
-                from: Some(&begin.pose),
-                duration_s: step_s,
-                inner_speeds,
-                effort,
-                strength_share: strength,
-            };
+            let step =
+                Step { from: Some(&begin.pose), duration_s: step_s, inner_speeds, effort, strength_share };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.proportional_steps_left = match verified {
@@ -347,7 +342,7 @@ impl ReferenceGenerator {
                 }
                 Err(_) => {}
             }
-            (verified, strength)
+            (verified, strength_share)
         });
         match verified {
             Some((Ok(kind), strength)) => self.stop.adopt(kind, strength),

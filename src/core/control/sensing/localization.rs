@@ -131,12 +131,12 @@ impl Localization {
         let kinematic_state = self.tracker.kinematic_state();
         let twist = kinematic_state.twist(machine, &rate_m_s).ok_or(DiagnosticCode::SingularPose)?;
         let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
-        let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
+        let time_to_singularity_s = self.time_to_singularity(measurement.time_ns, determinant);
         let pose = *self.tracker.pose();
         Ok(Located {
             measurement,
             rate_m_s,
-            platform: PlatformState { pose, twist, condition, time_to_singularity_s: time_to_singularity },
+            platform: PlatformState { pose, twist, condition, time_to_singularity_s },
         })
     }
 

@@ -104,15 +104,15 @@ impl Window {
         }
         let n = f64::from(self.count);
         let spread = self.t_t - self.t * self.t / n;
-        let (mut rate, mut most) = ([0.0; LEGS], 0.0_f64);
+        let (mut rate_m_s, mut most) = ([0.0; LEGS], 0.0_f64);
         let sums = self.l.iter().zip(&self.t_l).zip(&self.l_l);
-        for (rate, ((l, t_l), l_l)) in rate.iter_mut().zip(sums) {
+        for (rate, ((l, t_l), l_l)) in rate_m_s.iter_mut().zip(sums) {
             let common = t_l - self.t * l / n;
             *rate = common / spread;
             most = most.max(l_l - l * l / n - *rate * common);
         }
         let scatter = (most / (n - 2.0)).sqrt();
-        Some(WindowRates { rate_m_s: rate, uncertainty_m_s: DEVIATIONS * scatter / spread.sqrt(), scatter })
+        Some(WindowRates { rate_m_s, uncertainty_m_s: DEVIATIONS * scatter / spread.sqrt(), scatter })
     }
 }
 

@@ -131,18 +131,22 @@ mod tests {
     fn the_speed_of_a_target_is_a_share_of_the_limits_of_autonomous_motions() {
         let one = DerivativeLimits { velocity: 1.0, acceleration: 1.0, jerk: 1.0 };
         let limits = Limits { position: one, orientation: one, autonomous_scale: 0.5 };
-        for (target_speed, share) in
+        for (target_speed_share, share) in
             [(0.0, 1.0), (0.25, 0.25), (1.0, 1.0), (2.0, 1.0), (1e-300, 0.01), (-1.0, 1.0), (f64::NAN, 1.0)]
         {
             for (kind, scale) in [(SetpointKind::Target, 0.5 * share), (SetpointKind::Motion, 1.0)] {
-                let setpoint = Setpoint { kind, target_speed_share: target_speed, ..Setpoint::default() };
+                let setpoint = Setpoint { kind, target_speed_share, ..Setpoint::default() };
                 let (setpoint, samples) = (SetpointMotion::new(setpoint), PoseSamples::default());
                 let target = Target::of_setpoint(&setpoint, &samples);
                 let found = target.limits(&limits, 1.0, &Acceleration::default());
-                assert_eq!([found.position.jerk, found.orientation.velocity], [scale; 2], "{target_speed}");
+                assert_eq!(
+                    [found.position.jerk, found.orientation.velocity],
+                    [scale; 2],
+                    "{target_speed_share}"
+                );
                 // With a hundredth of the strength an autonomous motion has the lesser acceleration of both.
                 let weak = target.limits(&limits, 0.01, &Acceleration::default());
-                assert_eq!(weak.position.acceleration, scale.min(0.01), "{target_speed}");
+                assert_eq!(weak.position.acceleration, scale.min(0.01), "{target_speed_share}");
             }
         }
     }

@@ -221,24 +221,18 @@ fn check_following_error(
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
     let Some(PoseError { pose, twist }) = error else { return Ok(()) };
-    let Parameters {
-        following_position_m: following_position,
-        following_orientation_rad: following_orientation,
-        ..
-    } = parameters;
-    let Parameters {
-        following_velocity_m_s: following_velocity,
-        following_angular_velocity_rad_s: following_angular_velocity,
-        ..
-    } = parameters;
-    let ratio =
-        largest_ratio([pose.linear.norm() / following_position, pose.angular.norm() / following_orientation]);
+    let Parameters { following_position_m, following_orientation_rad, .. } = parameters;
+    let Parameters { following_velocity_m_s, following_angular_velocity_rad_s, .. } = parameters;
+    let ratio = largest_ratio([
+        pose.linear.norm() / following_position_m,
+        pose.angular.norm() / following_orientation_rad,
+    ]);
     if !active.check(Limit::Following, ratio) {
         return Err(Diagnostic::new(DiagnosticCode::FollowingError, ratio, 1.0));
     }
     let ratio = largest_ratio([
-        twist.linear.norm() / following_velocity,
-        twist.angular.norm() / following_angular_velocity,
+        twist.linear.norm() / following_velocity_m_s,
+        twist.angular.norm() / following_angular_velocity_rad_s,
     ]);
     if active.check(Limit::Following, ratio) {
         return Ok(());

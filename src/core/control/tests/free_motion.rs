@@ -103,8 +103,8 @@ fn by_lengths(away: impl Fn(u64) -> f64, milliseconds: u64) -> Vec<Result<Motion
     let home = constants.home.lengths(constants.machine());
     let mut free = FreeMotion::default();
     let of = |ms: u64| {
-        let length = home.map(|length| length + away(ms));
-        let measurement = Measurement { time_ns: ms * MS, length_m: length, ..Measurement::default() };
+        let length_m = home.map(|length| length + away(ms));
+        let measurement = Measurement { time_ns: ms * MS, length_m, ..Measurement::default() };
         // The twist from the filter of rates must not be used.
         let twist = Twist { linear: Vector3::x(), ..Twist::default() };
         let pose = *constants.home.pose();

@@ -36,8 +36,8 @@ impl Bench {
 
     /// Measurement in which every leg is longer than at home.
     fn at(&self, after_ns: u64, longer: f64) -> Measurement {
-        let length = self.home.map(|length| length + longer);
-        Measurement { time_ns: START_NS + after_ns, length_m: length, ..Measurement::default() }
+        let length_m = self.home.map(|length| length + longer);
+        Measurement { time_ns: START_NS + after_ns, length_m, ..Measurement::default() }
     }
 
     /// Time stamp of the valid measurement in a cycle.
@@ -61,10 +61,10 @@ impl Bench {
 #[test]
 fn the_first_measurement_is_finite_within_the_stroke_and_recent() {
     let machine = machine(&mut RandomVectors::new(71));
-    let Actuator { min_length_m: min_length, max_length_m: max_length, .. } = machine.actuator;
+    let Actuator { min_length_m, max_length_m, .. } = machine.actuator;
     let tolerance = 0.02 * machine.actuator.stroke();
     for leg in 0..LEGS {
-        for (end, sign) in [(min_length, -1.0), (max_length, 1.0)] {
+        for (end, sign) in [(min_length_m, -1.0), (max_length_m, 1.0)] {
             let refused = |share: f64| {
                 Bench::first(|bench| {
                     let mut new = bench.at(0, 0.0);

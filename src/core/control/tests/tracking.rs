@@ -15,10 +15,10 @@ fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, 
     let mut error = PoseError::default();
     for (k, (time_ms, displacement)) in measured.iter().enumerate() {
         let pose = home.displaced(displacement);
-        let length = leg_lengths(constants.machine(), &pose);
+        let length_m = leg_lengths(constants.machine(), &pose);
         let measurement = Measurement {
             time_ns: time_ms * MS,
-            length_m: length,
+            length_m,
             rate_m_s: Some([0.0; LEGS]),
             ..Measurement::default()
         };

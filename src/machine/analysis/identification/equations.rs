@@ -53,9 +53,9 @@ pub enum Load {
 impl Load {
     /// Parameters of the body, in the order of the platform's parameters in the regressor.
     pub(super) fn parameters(&self) -> SVector<f64, BODY> {
-        let Self::Known { mass_kg: mass, at_m: [x, y, z] } = *self else { return SVector::zeros() };
+        let Self::Known { mass_kg, at_m: [x, y, z] } = *self else { return SVector::zeros() };
         SVector::from([1.0, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
-            * mass
+            * mass_kg
     }
 }
 

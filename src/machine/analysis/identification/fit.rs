@@ -62,12 +62,12 @@ pub(super) fn fit(
     let triangles =
         core::array::from_fn(|leg| triangle(equations.iter().filter(|equation| equation.leg == leg)));
     let problem = Problem { parameters, triangles, is_scale_known };
-    let (mut free, mut sigma) = (parameters.prior, FIRST_RESIDUAL_RATIO * max_force);
+    let (mut free, mut sigma_n) = (parameters.prior, FIRST_RESIDUAL_RATIO * max_force);
     for _ in 0..TURNS {
-        free = problem.minimise(free, sigma)?;
+        free = problem.minimise(free, sigma_n)?;
         let unknowns = parameters.unknowns(&free);
         let squares: f64 = equations.iter().map(|equation| residual(equation, &unknowns).powi(2)).sum();
-        sigma = (squares / count).sqrt().max(f64::MIN_POSITIVE);
+        sigma_n = (squares / count).sqrt().max(f64::MIN_POSITIVE);
     }
     let unknowns = parameters.unknowns(&free);
     let of_legs: [Vec<f64>; LEGS] = core::array::from_fn(|leg| {
@@ -76,12 +76,12 @@ pub(super) fn fit(
     let square = |values: &Vec<f64>| values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64;
     let inflation = of_legs.iter().map(|leg| square(leg) * correlated_count(leg)).sum::<f64>()
         / of_legs.iter().map(square).sum::<f64>();
-    let inflation = inflation.max(1.0);
-    let (covariance, shown, unknown) = problem.covariance(&free, sigma * inflation.sqrt())?;
+    let inflation_ratio = inflation.max(1.0);
+    let (covariance, shown, unknown) = problem.covariance(&free, sigma_n * inflation_ratio.sqrt())?;
     Some(Fit {
         free,
-        sigma_n: sigma,
-        inflation_ratio: inflation,
+        sigma_n,
+        inflation_ratio,
         covariance,
         shown,
         unknown,

@@ -100,14 +100,14 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
     let is_scale_known = holds_machine || has_known_weight;
     let fit = fit(&parameters, &all, file.actuator.max_force_n, is_scale_known)?;
     let Bodies { machine, payload } = parameters.bodies(&fit.free);
-    let Fit { shown, unknown, residual_n: residual, correlation, .. } = fit;
+    let Fit { shown, unknown, residual_n, correlation, .. } = fit;
     Some(Identification {
         machine,
         payload,
         equations: all.len(),
         shown,
         unknown,
-        residual_n: residual,
+        residual_n,
         correlation,
         base_parameters: least_squares(file, &all).filter(|_| has_known_weight),
         is_scale_known,
@@ -200,19 +200,13 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
     let parameters = Parameters::new(machine);
     let unknowns = parameters.unknowns(&parameters.prior);
     let prediction = |equation: Equation| {
-        let command = equation.coefficients.row(SCALE + equation.leg).x;
-        let residual = fit::residual(&equation, &unknowns);
+        let command_n = equation.coefficients.row(SCALE + equation.leg).x;
+        let residual_n = fit::residual(&equation, &unknowns);
         let middle =
             run.samples.get(equation.first + GROUP / 2).map(|sample| leg_motion(machine, &sample.motion));
         let of_leg = |values: [f64; LEGS]| values.get(equation.leg).copied().unwrap_or_default();
         let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length_m), of_leg(legs.rate_m_s)]);
-        Prediction {
-            leg: equation.leg,
-            time_s: equation.time_s,
-            motion,
-            command_n: command,
-            residual_n: residual,
-        }
+        Prediction { leg: equation.leg, time_s: equation.time_s, motion, command_n, residual_n }
     };
     equations(machine, &run.samples, &run.load).into_iter().map(prediction).collect()
 }
@@ -258,11 +252,10 @@ pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LE
 /// stands.
 pub fn prediction_errors(machine: &Machine, runs: &[Run]) -> [[f64; 2]; LEGS] {
     let mut errors = [(0.0, f64::NAN, 0_u32); LEGS];
-    for Prediction { leg, residual_n: residual, .. } in runs.iter().flat_map(|run| predictions(machine, run))
-    {
+    for Prediction { leg, residual_n, .. } in runs.iter().flat_map(|run| predictions(machine, run)) {
         if let Some((squares, largest, count)) = errors.get_mut(leg) {
             (*squares, *largest, *count) =
-                (*squares + residual * residual, largest.max(residual.abs()), *count + 1);
+                (*squares + residual_n * residual_n, largest.max(residual_n.abs()), *count + 1);
         }
     }
     errors.map(|(squares, largest, count)| [(squares / f64::from(count)).sqrt(), largest])

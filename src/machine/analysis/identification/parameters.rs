@@ -88,11 +88,11 @@ impl Parameters {
         let (actuator, radius, mass) = (&file.actuator, file.joints.radius_m, file.platform.mass_kg);
         let guess = {
             let size = (PAYLOAD_SIZE * radius).powi(2);
-            let mass = PAYLOAD_PER_PLATFORM * mass;
+            let mass_kg = PAYLOAD_PER_PLATFORM * mass;
             Platform {
-                mass_kg: mass,
+                mass_kg,
                 center_of_mass_m: Vector3::zeros(),
-                inertia: Matrix3::identity() * (mass * size),
+                inertia: Matrix3::identity() * (mass_kg * size),
             }
         };
         let mut prior = Free::zeros();
@@ -211,11 +211,11 @@ fn scaled(link: &Link, mass: f64, logs: &Vector3<f64>, ends: [f64; 2]) -> Link {
 fn body(parameters: SVector<f64, BODY>) -> Platform {
     let [a, d1, d2, d3, s12, s23, s13, t1, t2, t3]: [f64; BODY] = parameters.into();
     let triangle = Matrix3::new(d1, s12, s13, 0.0, d2, s23, 0.0, 0.0, d3);
-    let mass = (2.0 * a).exp();
+    let mass_kg = (2.0 * a).exp();
     // About the centre of mass the columns of t drop out.
-    let moments = triangle * triangle.transpose() * mass;
+    let moments = triangle * triangle.transpose() * mass_kg;
     let inertia = Matrix3::identity() * moments.trace() - moments;
-    Platform { mass_kg: mass, center_of_mass_m: Vector3::new(t1, t2, t3), inertia }
+    Platform { mass_kg, center_of_mass_m: Vector3::new(t1, t2, t3), inertia }
 }
 
 /// Cholesky parameters of a body.

@@ -65,11 +65,11 @@ fn a_loop_beyond_its_margins_grows_and_within_them_fades() {
 #[test]
 fn what_is_stable_is_one_interval_of_bandwidths_and_of_delays() {
     for compensates_disturbance in [true, false] {
-        for delay in [0.6, 2.1, 5.3] {
+        for delay_periods in [0.6, 2.1, 5.3] {
             let each = SampledLoop {
                 compensates_disturbance,
-                known_delay_periods: delay - 0.5,
-                delay_periods: delay,
+                known_delay_periods: delay_periods - 0.5,
+                delay_periods,
                 ..at_10_hz(10.0, 0.0)
             };
             let limit = each.largest_wn_t();
@@ -80,7 +80,7 @@ fn what_is_stable_is_one_interval_of_bandwidths_and_of_delays() {
             }
             let longest = each.longest_delay();
             for tenth in (0..600).filter(|tenth| (0.1 * f64::from(*tenth) - longest).abs() > 0.05) {
-                let at = SampledLoop { delay_periods: delay.max(0.1 * f64::from(tenth)), ..each };
+                let at = SampledLoop { delay_periods: delay_periods.max(0.1 * f64::from(tenth)), ..each };
                 assert_eq!(at.is_stable(), at.delay_periods < longest, "{at:?}, {longest}");
             }
         }

@@ -129,8 +129,8 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     let loops = if mode.acts_on_legs() {
         [softest, stiffest].map(|gain| (position_bandwidth_hz, of(position_damping_ratio), gain))
     } else {
-        let held_pole = limits.held_pole_per_s * plant.realtime.period_s();
-        let with = |damping_ratio| SampledLoop { held_pole_t: held_pole, ..of(damping_ratio) };
+        let held_pole_t = limits.held_pole_per_s * plant.realtime.period_s();
+        let with = |damping_ratio| SampledLoop { held_pole_t, ..of(damping_ratio) };
         [
             (position_bandwidth_hz, with(position_damping_ratio), 1.0),
             (orientation_bandwidth_hz, with(orientation_damping_ratio), 1.0),

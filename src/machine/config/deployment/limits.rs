@@ -89,7 +89,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
     let turning = turning_condition(machine, realtime, &position, feedback_scale);
     let (condition, survey) = condition(&mut section, machine, realtime, turning);
-    let held_pole = survey.iter().map(|pose| pose.pole_per_s).fold(0.0, f64::max);
+    let held_pole_per_s = survey.iter().map(|pose| pose.pole_per_s).fold(0.0, f64::max);
     let reference = ReferenceLimits { position, orientation, autonomous_scale };
     check_turning(&section, machine, realtime, &survey, &reference, feedback_scale);
     DeploymentLimits {
@@ -101,7 +101,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
         stroke_margin_m,
         force_rate_n_s,
         condition,
-        held_pole_per_s: held_pole,
+        held_pole_per_s,
     }
 }
 

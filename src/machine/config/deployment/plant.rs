@@ -104,22 +104,18 @@ fn friction(mut section: SectionReader) -> Friction {
 
 fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     let stiffness = section.bounded_number("stiffness_n_m", Bound::Positive);
-    let damping = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
-    let backlash = section.number_or("backlash_m", 0.0, Bound::NotNegative);
+    let damping_n_s_m = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
+    let backlash_m = section.number_or("backlash_m", 0.0, Bound::NotNegative);
     if stiffness.is_some() && machine.actuator.reflected_mass_kg == 0.0 {
         section.reject(
             "stiffness_n_m",
             "must not be given with actuator.reflected_mass_kg = 0: a drive behind a spring has mass",
         );
     }
-    if stiffness.is_none() && backlash > 0.0 {
+    if stiffness.is_none() && backlash_m > 0.0 {
         section.reject("backlash_m", "must be 0 without stiffness_n_m: the flanks of a backlash are springs");
     }
-    stiffness.map(|stiffness| ElasticLeg {
-        stiffness_n_per_m: stiffness,
-        damping_n_s_m: damping,
-        backlash_m: backlash,
-    })
+    stiffness.map(|stiffness_n_per_m| ElasticLeg { stiffness_n_per_m, damping_n_s_m, backlash_m })
 }
 
 fn sensor(mut section: SectionReader) -> SensorErrors {

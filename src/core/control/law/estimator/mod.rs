@@ -70,7 +70,7 @@ impl KalmanFilter {
         time_ns: u64,
         measured: &ErrorCoordinates,
     ) -> Vector6<f64> {
-        let EstimatorConstants { noise, max_compensated_acceleration: max_compensated, .. } = constants;
+        let EstimatorConstants { noise, max_compensated_acceleration, .. } = constants;
         let Self { state, covariance, .. } = self;
         let rate_hz = 1.0 / noise.period_s;
         covariance.advance(noise, seconds_between(self.time_ns, time_ns) * rate_hz);
@@ -80,7 +80,8 @@ impl KalmanFilter {
             let difference = (measured.rate - state.rate) * noise.period_s;
             state.correct(covariance.correct_rate(variance), rate_hz, &difference);
         }
-        state.disturbance = state.disturbance.sup(&-max_compensated).inf(max_compensated);
+        state.disturbance =
+            state.disturbance.sup(&-max_compensated_acceleration).inf(max_compensated_acceleration);
         self.time_ns = time_ns;
         innovation
     }

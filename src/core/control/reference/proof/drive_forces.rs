@@ -56,12 +56,14 @@ impl ForceBounds {
         let LegLanes(forces) = loads.holding;
         let actuator = &constants.machine().actuator;
         let (available, friction) = (actuator.available_force(), actuator.largest_coulomb_friction());
-        let holding = largest(forces) + friction;
-        let is_beyond = holding > self.holding_n;
+        let holding_n = largest(forces) + friction;
+        let is_beyond = holding_n > self.holding_n;
         if is_beyond {
-            let moving = holding + (MAX_MOVING_SHARE - MAX_HOLDING_SHARE) * available;
-            *self =
-                Self { holding_n: holding + START_FORCE_RATIO * available, moving_n: moving.min(available) };
+            let moving = holding_n + (MAX_MOVING_SHARE - MAX_HOLDING_SHARE) * available;
+            *self = Self {
+                holding_n: holding_n + START_FORCE_RATIO * available,
+                moving_n: moving.min(available),
+            };
         }
         is_beyond
     }
@@ -211,8 +213,8 @@ impl ForceProof {
     /// Whether the drives are strong enough whatever the pose, with the factor of a ball.
     #[inline(always)]
     fn is_generous(&self, ball: &BallLoads, distance: &CenterDistance) -> bool {
-        let ForceBound { wrench, axial_n: axial } = self.at_any_pose;
-        ball.factor(distance) * wrench + axial <= self.bounds.holding_n
+        let ForceBound { wrench, axial_n } = self.at_any_pose;
+        ball.factor(distance) * wrench + axial_n <= self.bounds.holding_n
     }
 
     /// Loads at the centre of a ball, computed if the effort suffices.
@@ -247,10 +249,10 @@ impl ForceProof {
             }
         };
         let changes = &constants.force_changes;
-        let CenterDistance { turn_rad: turn, turned_leg, .. } = *distance;
+        let CenterDistance { turn_rad, turned_leg, .. } = *distance;
         let motion = self.demand.largest();
         let (at_rest, moving) =
-            (changes.at_rest(turn, turned_leg), changes.moving(&motion, turn, turned_leg));
+            (changes.at_rest(turn_rad, turned_leg), changes.moving(&motion, turn_rad, turned_leg));
         let change =
             ForceBound { wrench: at_rest.wrench + moving.wrench, axial_n: at_rest.axial_n + moving.axial_n };
         let axial_norm = changes.axial_norm(&motion);

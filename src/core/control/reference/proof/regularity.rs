@@ -89,21 +89,16 @@ impl Ball {
     /// pivots are needed: their effort is subtracted afterwards.
     pub fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
-        let Conditioning {
-            sensitivity,
-            largest_row_norm: largest_row,
-            shortest_leg_m: shortest,
-            universal_sine,
-            is_pivoted,
-        } = Conditioning::new(constants.machine(), center);
+        let Conditioning { sensitivity, largest_row_norm, shortest_leg_m, universal_sine, is_pivoted } =
+            Conditioning::new(constants.machine(), center);
         if is_pivoted {
             *effort = effort.saturating_sub(PIVOTING_EFFORT);
         }
         let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };
         let inverse_norm = condition / norm;
-        let loads = BallLoads::new(center, inverse_norm, largest_row);
-        Ok(Self { norm, inverse_norm, shortest_m: shortest, regularity, loads })
+        let loads = BallLoads::new(center, inverse_norm, largest_row_norm);
+        Ok(Self { norm, inverse_norm, shortest_m: shortest_leg_m, regularity, loads })
     }
 }
 /// Distances around a pose: shift \[m\] and turn \[rad\].

@@ -105,7 +105,7 @@ impl Approach {
 
     fn wanted_at(
         &self,
-        TargetOffset { offset, target_velocity: velocity, target_acceleration: acceleration }: &TargetOffset,
+        TargetOffset { offset, target_velocity, target_acceleration }: &TargetOffset,
         ahead: &Vector3<f64>,
         distance: f64,
         root: f64,
@@ -113,10 +113,10 @@ impl Approach {
         let (closing, slope) = self.closing_velocity_of(distance, || root);
         let ratio = if closing > 0.0 { closing / distance } else { slope };
         let direction = if distance > 0.0 { offset / distance } else { Vector3::zeros() };
-        let relative = velocity - ahead;
-        let wanted = velocity + offset * ratio;
+        let relative = target_velocity - ahead;
+        let wanted = target_velocity + offset * ratio;
         let derivative =
-            acceleration + relative * ratio + direction * ((slope - ratio) * direction.dot(&relative));
+            target_acceleration + relative * ratio + direction * ((slope - ratio) * direction.dot(&relative));
         let mut wanted = WantedVelocity { velocity: wanted, derivative, is_limited: false };
         self.limit_velocity(&mut wanted);
         wanted

@@ -166,15 +166,14 @@ impl Walls {
         let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
         let kept = WALL_RATIO * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
-        let LegMotion { length_m: length, rate_m_s: rate, accel_m_s2: accel } =
-            leg_motion(machine, &without_acceleration);
+        let LegMotion { length_m, rate_m_s, accel_m_s2 } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
         let approach = Approach::of_bound(limits.position, WALL_CLOSING_LIMITS_SHARE, step_s);
         let halves_s = half_durations(limits, led);
         let half_s = halves_s.angular.max(halves_s.linear);
         let per_way = 1.0 / half_s;
         let ends = bounds.shortest_m.iter().zip(&bounds.longest_m);
-        let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
+        let legs = length_m.iter().zip(rate_m_s.iter().zip(&accel_m_s2)).zip(ends);
         for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.into_iter().zip(legs) {
             let [mx, my, mz, nx, ny, nz] = column;
             let (moment, direction) = (Vector3::new(mx, my, mz), Vector3::new(nx, ny, nz));

@@ -80,13 +80,13 @@ pub(in crate::control::reference) fn straight_extent(
     DerivativeLimits { acceleration, jerk, .. }: &DerivativeLimits,
 ) -> StopExtent {
     let ramp = acceleration / jerk;
-    let (duration, length) = if v >= acceleration * ramp {
+    let (duration_s, distance_bound) = if v >= acceleration * ramp {
         (v / acceleration + ramp, 0.5 * v * (v / acceleration + ramp))
     } else {
         let ramp = (v / jerk).sqrt();
         (2.0 * ramp, v * ramp)
     };
-    StopExtent { peak_velocity: v, duration_s: duration, distance_bound: length }
+    StopExtent { peak_velocity: v, duration_s, distance_bound }
 }
 
 /// Direction u of the stop that brakes at once: along the velocity, or the acceleration if there is none.
@@ -263,11 +263,11 @@ impl<'a, S: Simd> Pieces<'a, S> {
         if !(dt > 0.0) {
             return;
         }
-        let Self { simd, stop: Stop { pieces, count, begins, duration_s: duration, .. }, end } = self;
+        let Self { simd, stop: Stop { pieces, count, begins, duration_s, .. }, end } = self;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
-            (*piece, *begin) = (Piece::new(end, &jerk), *duration);
+            (*piece, *begin) = (Piece::new(end, &jerk), *duration_s);
             *count += 1;
-            *duration += dt;
+            *duration_s += dt;
             *end = piece.after(*simd, dt);
         }
     }
@@ -292,9 +292,9 @@ impl<'a, S: Simd> Pieces<'a, S> {
     #[inline(always)]
     fn finish_with_rest(self, peak_velocity: f64) {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
-        let Stop { pieces, count, begins, duration_s: duration, .. } = self.stop;
+        let Stop { pieces, count, begins, duration_s, .. } = self.stop;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
-            (*piece, *begin) = (Piece::new(&rest, &Vector3::zeros()), *duration);
+            (*piece, *begin) = (Piece::new(&rest, &Vector3::zeros()), *duration_s);
             *count += 1;
         }
         self.stop.peak_velocity = peak_velocity;

@@ -56,13 +56,13 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
         let (approach, other) = (Approach::new(P, 0.9, 1e-3), Approach::new(P, 0.4, 2e-3));
         let distance = 10.0_f64.powf(-3.0 * samples.uniform());
         let offset = samples.vector(distance);
-        let [velocity, ahead, acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
+        let [target_velocity, ahead, target_acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
         let at = |dt: f64| {
-            let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
+            let offset = offset + (target_velocity - ahead) * dt + target_acceleration * (0.5 * dt * dt);
             let target = TargetOffset {
                 offset,
-                target_velocity: velocity + acceleration * dt,
-                target_acceleration: acceleration,
+                target_velocity: target_velocity + target_acceleration * dt,
+                target_acceleration,
             };
             // The target of the other vector does not matter.
             let beside = TargetOffset { offset: 3.0 * offset, ..target };

@@ -21,18 +21,13 @@ fn no_force_changes_by_more_than_its_bound() {
             let center = machine.home_pose().displaced(&around);
             let step = Twist { angular: samples.vector(0.1), linear: samples.vector(0.1 * stroke) };
             let (turn, shift) = (step.angular.norm(), step.linear.norm());
-            let Conditioning {
-                sensitivity,
-                largest_row_norm: largest_row,
-                shortest_leg_m: shortest,
-                universal_sine,
-                ..
-            } = Conditioning::new(&machine, &center);
+            let Conditioning { sensitivity, largest_row_norm, shortest_leg_m, universal_sine, .. } =
+                Conditioning::new(&machine, &center);
             let moved = shift + changes.arm_m * turn;
-            let turned_leg = moved / (shortest * (shortest - moved)).sqrt();
+            let turned_leg = moved / (shortest_leg_m * (shortest_leg_m - moved)).sqrt();
             let change = (6.0 * (turned_leg.powi(2) + (turn + turned_leg).powi(2))).sqrt();
             let inverse = sensitivity.condition / sensitivity.norm;
-            if !(moved < shortest && inverse * change < 0.9 && universal_sine > turned_leg + 0.1) {
+            if !(moved < shortest_leg_m && inverse * change < 0.9 && universal_sine > turned_leg + 0.1) {
                 continue;
             }
             let twist = Twist { angular: samples.vector(1.0), linear: samples.vector(1.0) };
@@ -55,7 +50,7 @@ fn no_force_changes_by_more_than_its_bound() {
                 * (largest.velocity_m_s + changes.arm_m * largest.angular_velocity_rad_s
                     - changes.max_rate_m_s)
                     .max(0.0);
-            let bound = largest_row / (1.0 - inverse * change) * wrench + rest.axial_n + moving.axial_n;
+            let bound = largest_row_norm / (1.0 - inverse * change) * wrench + rest.axial_n + moving.axial_n;
             for (there, here) in forces(center.displaced(&step), twist).iter().zip(at_center) {
                 let ratio = (there - here).abs() / (bound + friction + 1e-9);
                 assert!(ratio <= 1.0, "{number}: {ratio}");
