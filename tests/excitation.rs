@@ -9,7 +9,7 @@ use hexad::config::Config;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::regressor::{inertial_parameters, regressor};
+use hexad::model::regressor::{dynamic_parameters, regressor};
 use hexad::model::task::TaskState;
 use hexad::motion::excitation::{Excitation, FourierSeries, PERIOD_S};
 use nalgebra::{DMatrix, Vector6};
@@ -134,7 +134,7 @@ fn predicted_deviations_are_those_of_least_squares() {
             let full = regressor(machine, &state.motion()).unwrap();
             let columns = full.select_columns(&base);
             let by_base = &columns * DMatrix::from_iterator(base.len(), 1, base.iter().map(|k| values[*k]));
-            let by_all = full * inertial_parameters(machine);
+            let by_all = full * dynamic_parameters(machine);
             assert!((by_base - by_all).amax() < 1e-9 * by_all.amax(), "{name}");
             normal += columns.transpose() * columns;
         }

@@ -26,7 +26,7 @@ fn run(truth: &Machine, series: &Series, seconds: f64, noise: f64, load: Load, r
     let samples = (0..(seconds / 0.005) as u32).map(sample).map(|(time_s, motion, command)| MotionSample {
         time_s,
         motion,
-        command_n: command.map(|force| force + noise * random.gaussian()),
+        command_n: command.map(|force| force + noise * random.near_gaussian()),
     });
     Run { samples: samples.collect(), load }
 }

@@ -10,7 +10,7 @@ use hexad::model::fidelity::{
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::{Link, Machine, Platform, TransverseInertia};
 use hexad::model::regressor::{
-    InertialParameters, Regressor, inertial_parameters, regressor, rod_mass_null_direction,
+    DynamicParameters, Regressor, dynamic_parameters, regressor, rod_mass_null_direction,
 };
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::task::TaskState;
@@ -45,8 +45,8 @@ impl Row<'_> {
 
     /// The share of some parameters in the forces.
     fn share(&self, y: &Regressor, parameters: impl Fn(usize) -> bool) -> Vector6<f64> {
-        let all = inertial_parameters(self.machine());
-        y * InertialParameters::from_fn(|k, _| if parameters(k) { all[k] } else { 0.0 })
+        let all = dynamic_parameters(self.machine());
+        y * DynamicParameters::from_fn(|k, _| if parameters(k) { all[k] } else { 0.0 })
     }
 }
 
@@ -83,8 +83,8 @@ fn of_spin(index: usize) -> bool {
 fn gravity_leaves_out_all_but_weight() {
     check::<Gravity>("gravity", &[], |row| {
         let held = Motion { twist: Twist::default(), acceleration: Acceleration::default(), ..row.motion };
-        let weight = regressor(row.machine(), &held).unwrap() * inertial_parameters(row.machine());
-        row.regressor() * inertial_parameters(row.machine()) - weight
+        let weight = regressor(row.machine(), &held).unwrap() * dynamic_parameters(row.machine());
+        row.regressor() * dynamic_parameters(row.machine()) - weight
     });
 }
 
@@ -107,7 +107,7 @@ fn no_velocity_leaves_out_what_grows_with_it_but_friction_and_the_spin() {
     check::<NoVelocity>("no-velocity", &[], |row| {
         let (y, at_rest) = (row.regressor(), row.regressor_at_rest());
         let friction = row.share(&y, |k| k >= 20);
-        (y - at_rest) * inertial_parameters(row.machine()) - friction + row.share(&at_rest, of_spin)
+        (y - at_rest) * dynamic_parameters(row.machine()) - friction + row.share(&at_rest, of_spin)
     });
 }
 

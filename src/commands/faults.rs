@@ -63,7 +63,7 @@ impl FaultEntry {
         Self {
             code: code as u32,
             name: code.name(),
-            cause: code.cause().trim(),
+            cause: code.meaning().trim(),
             reaction,
             remedy: code.remedy(),
         }

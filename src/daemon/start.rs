@@ -66,7 +66,7 @@ pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
     prepare(realtime.io_cpu, scheduled)
 }
 
-/// FIFO priority of the control thread: above ordinary processes and above all threads that write files, so
+/// FIFO priority of the threads of requests and of motions: above ordinary processes and above all threads that write files, so
 /// that they do not delay an emergency stop.
 pub(super) const REQUESTS_PRIORITY: i32 = 2;
 

@@ -280,10 +280,10 @@ fn run_realtime(
     let (mut handover, mut memories, mut watch) = (links.handover, links.memories, links.watch);
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();
-        handover.begin_cycle(&mut controller, woke_ns);
+        handover.answer_offer(&mut controller, woke_ns);
         memories.begin_cycle(controller.memory());
         input.request = intake.next(word.load(), woke_ns, input.release_ns);
-        watch.begin_cycle(input);
+        watch.answer_search(input);
         let output = controller.step(input);
         watch.end_cycle(input.release_ns, output.platform.map(|platform| platform.pose));
         output

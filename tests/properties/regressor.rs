@@ -1,8 +1,8 @@
 //! The regressor form: exact, linear, and blind in the directions it names.
 
 use hexad::model::regressor::{
-    COULOMB, INDISTINGUISHABLE_PAIRS, InertialParameters, PARAMETER_COUNT, REFLECTED, Regressor, VISCOUS,
-    inertial_parameters, regressor, rod_mass_null_direction,
+    COULOMB, INDISTINGUISHABLE_PAIRS, DynamicParameters, DYNAMIC_PARAMETER_COUNT, REFLECTED, Regressor, VISCOUS,
+    dynamic_parameters, regressor, rod_mass_null_direction,
 };
 
 use super::*;
@@ -12,12 +12,12 @@ fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
 }
 
 /// `|Y| |p|`: what is summed up to a force, hence what rounding is a share of.
-fn summed(y: &Regressor, p: &InertialParameters) -> f64 {
+fn summed(y: &Regressor, p: &DynamicParameters) -> f64 {
     (y.abs() * p.abs()).amax()
 }
 
 /// The machine that has these parameters, on the geometry of another.
-fn with_parameters(mut machine: Machine, p: &InertialParameters) -> Machine {
+fn with_parameters(mut machine: Machine, p: &DynamicParameters) -> Machine {
     let at = |index: usize| p[index];
     let center = Vector3::new(at(1), at(2), at(3)) / at(0);
     let about_c = Matrix3::new(at(4), at(7), at(8), at(7), at(5), at(9), at(8), at(9), at(6));
@@ -64,14 +64,14 @@ proptest! {
             other.transverse_inertia.quadratic_kg = q;
         }
         for machine in [&machine, &other] {
-            let p = inertial_parameters(machine);
+            let p = dynamic_parameters(machine);
             let difference = (y * p - forces(machine, &motion)).amax();
             prop_assert!(difference < 1e-12 * summed(&y, &p), "{difference:e} of {:e}", summed(&y, &p));
         }
         // And p says all there is to say about a machine.
-        let p = inertial_parameters(&other);
+        let p = dynamic_parameters(&other);
         let rebuilt = with_parameters(machine, &p);
-        prop_assert!((inertial_parameters(&rebuilt) - p).amax() < 1e-12 * p.amax());
+        prop_assert!((dynamic_parameters(&rebuilt) - p).amax() < 1e-12 * p.amax());
         prop_assert!((forces(&rebuilt, &motion) - forces(&other, &motion)).amax() < 1e-11 * summed(&y, &p));
     }
 
@@ -100,7 +100,7 @@ proptest! {
             let mut machine = machine.clone();
             let reference = machine.rod.transverse_inertia.reference_length_m;
             machine.cylinder.transverse_inertia.reference_length_m = reference + apart;
-            let mut stacked = DMatrix::zeros(6 * at.len(), PARAMETER_COUNT);
+            let mut stacked = DMatrix::zeros(6 * at.len(), DYNAMIC_PARAMETER_COUNT);
             for (i, at) in at.iter().enumerate() {
                 let mut state = state_near_home(&machine, at);
                 state.xd *= 3.0;

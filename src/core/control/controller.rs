@@ -45,7 +45,8 @@ pub struct Output {
     pub answered_message: MessageId,
     /// Why that request was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
-    /// Forces \[N\]; zero unless the state has control.
+    /// Commands to the drives \[N\]; zero unless the state has control. With load friction and force scales a leg gets another
+    /// force, see [`Transmission`](crate::model::transmission::Transmission).
     pub command_n: [f64; LEGS],
     /// Wrench of the forces minus the wrench of the commanded forces, about C; zero unless forces are
     /// limited.
@@ -56,9 +57,9 @@ pub struct Output {
     pub missed_measurements: u64,
     /// Cycles under control without a new valid setpoint, since start.
     pub missed_setpoints: u64,
-    /// Measured state of the platform; `None` if the pose is unknown.
+    /// Measured state of the platform, without measured rates with the estimated twist; `None` if the pose is unknown.
     pub platform: Option<PlatformState>,
-    /// Reference minus measured under control; else setpoint minus measured, if both are known.
+    /// Reference minus measured under control; else setpoint minus measured, if the setpoint may be followed.
     pub error: Option<PoseError>,
     /// Reference at the end of this cycle's hold of the force, under control.
     pub reference: Option<Motion>,
@@ -175,7 +176,7 @@ impl Controller {
             drive_and_pose_checks: &reports,
             is_ready: drives.is_ready,
             feedback: &memory.feedback,
-            measurement_diagnostic: errors.measurement_diagnostic(),
+            sensor_or_drive_fault: errors.sensor_or_drive_fault(),
             disturbance_diagnostic: errors.disturbance_diagnostic(),
             may_be_frozen: errors.may_be_frozen(),
         };
@@ -209,7 +210,7 @@ impl Controller {
         // Written in place: the largest fields, and the count, whose struct `located` borrows until here.
         output.platform = located.as_ref().ok().map(|located| located.platform);
         (output.missed_measurements, output.missed_setpoints) =
-            (measurements.missed_cycles, setpoints.missed_cycles);
+            (measurements.cycles_without_valid, setpoints.cycles_without_valid);
         output.reference = output.state.has_control().then(|| *reference.motion());
         output
     }

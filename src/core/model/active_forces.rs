@@ -21,7 +21,7 @@ use super::fidelity::{Fidelity, ModelTerms, with_terms};
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
 use super::lanes3::Lanes3;
-use super::leg::{JointForces, LegConstants, LegReaction};
+use super::leg::{JointForces, LegConstants, ForceOnLeg};
 use super::machine::{Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
@@ -148,7 +148,7 @@ impl InverseDynamics {
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
         let universal_axis = Lanes3::load(simd, &self.machine.joints.universal_axis);
         let reaction =
-            LegReaction::new::<M>(simd, &self.legs, universal_axis, legs, &velocity, joint_acceleration);
+            ForceOnLeg::new::<M>(simd, &self.legs, universal_axis, legs, &velocity, joint_acceleration);
         let mut wrench = LaneWrench {
             torque: legs.arm.cross(reaction.transverse).folded(),
             force: reaction.transverse.folded(),

@@ -63,7 +63,7 @@ impl<V: LaneArithmetic> Lanes3<V> {
 
     /// Vector rotated by Cayley's rotation of `2 u`: `v + k (u x v + u x (u x v))`, `k = 2 / (1 + u.u)`.
     #[inline(always)]
-    pub fn turned(self, u: Self, k: V) -> Self {
+    pub fn cayley_rotated(self, u: Self, k: V) -> Self {
         let once = u.cross(self);
         self.plus_scaled(k, once + u.cross(once))
     }

@@ -131,14 +131,14 @@ fn lumped_mass(machine: &Machine) -> f64 {
 }
 
 /// Force F of the platform on each leg \[N\], base axes, split in two parts.
-pub(super) struct LegReaction<S: Simd> {
+pub(super) struct ForceOnLeg<S: Simd> {
     /// Part normal to the leg.
     pub transverse: Lanes3<f64x8<S>>,
     /// Part along n.
     pub axial_n: f64x8<S>,
 }
 
-impl<S: Simd> LegReaction<S> {
+impl<S: Simd> ForceOnLeg<S> {
     /// Evaluates the force; `joint_acceleration` is aB.
     #[inline(always)]
     pub fn new<M: ModelTerms>(

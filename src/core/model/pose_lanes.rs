@@ -23,7 +23,7 @@ use super::factorization::are_regular_blocks;
 use super::fidelity::{Fidelity, LegInertia, ModelTerms, with_terms};
 use super::inverse_geometry::LegGeometry;
 use super::lanes3::Lanes3;
-use super::leg::{LegConstants, LegReaction};
+use super::leg::{LegConstants, ForceOnLeg};
 use super::pose_factorization::{Column, LANES, Matrix, PoseFactorization, vectors};
 use super::rigid::Motion;
 use super::triples::{LegLanes, Triples};
@@ -153,7 +153,7 @@ impl InverseDynamics {
             let joint_acceleration = linear + map.times(arm);
             let universal_axis = Lanes3::splat(simd, &joint.universal_axis);
             let reaction =
-                LegReaction::new::<M>(simd, constants, universal_axis, &leg, &velocity, joint_acceleration);
+                ForceOnLeg::new::<M>(simd, constants, universal_axis, &leg, &velocity, joint_acceleration);
             if M::LEGS != LegInertia::Massless {
                 force = force + reaction.transverse;
                 torque = torque + arm.cross(reaction.transverse);

@@ -43,7 +43,7 @@ impl Random {
 
     /// Mean 0, variance 1: the sum of twelve uniform numbers less six. As good as Gaussian to three
     /// deviations, and never beyond six.
-    pub fn gaussian(&mut self) -> f64 {
+    pub fn near_gaussian(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }

@@ -49,7 +49,7 @@ use super::platform::acceleration_map;
 use super::rigid::Motion;
 
 /// Number of parameters.
-pub const PARAMETER_COUNT: usize = 32;
+pub const DYNAMIC_PARAMETER_COUNT: usize = 32;
 
 /// The drives' reflected mass.
 pub const REFLECTED: usize = 19;
@@ -77,17 +77,17 @@ pub const COULOMB: usize = VISCOUS + LEGS;
 /// | 19 | drive: reflected mass | kg |
 /// | 20-25 | viscous friction of leg 1 to 6 | N s/m |
 /// | 26-31 | Coulomb friction of leg 1 to 6 | N |
-pub type InertialParameters = SVector<f64, PARAMETER_COUNT>;
+pub type DynamicParameters = SVector<f64, DYNAMIC_PARAMETER_COUNT>;
 
 /// Regressor matrix Y, 6 x 32: one row per leg in the order 1..6, one column per parameter, \[N\] per unit of
 /// parameter.
-pub type Regressor = SMatrix<f64, 6, PARAMETER_COUNT>;
+pub type Regressor = SMatrix<f64, 6, DYNAMIC_PARAMETER_COUNT>;
 
 /// Pairs of parameters whose columns are equal at every motion: J1 and J2, Ix1 and Ix2.
 pub const INDISTINGUISHABLE_PAIRS: [[usize; 2]; 2] = [[11, 16], [12, 17]];
 
 /// Parameter vector p of a machine.
-pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
+pub fn dynamic_parameters(machine: &Machine) -> DynamicParameters {
     let (platform, cylinder, rod, actuator) =
         (&machine.platform, &machine.cylinder, &machine.rod, &machine.actuator);
     let moment = platform.center_of_mass_m * platform.mass_kg;
@@ -121,8 +121,8 @@ pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
 
 /// Direction of p in the null space of Y at every motion. Each rod is 1 kg heavier with the same `m2 e2` and
 /// `J2`; the platform is lighter by points of 1 kg at the `B_i`.
-pub fn rod_mass_null_direction(machine: &Machine) -> InertialParameters {
-    let mut direction = InertialParameters::zeros();
+pub fn rod_mass_null_direction(machine: &Machine) -> DynamicParameters {
+    let mut direction = DynamicParameters::zeros();
     for b in machine.joints.triples.unpack_vectors(&machine.joints.platform) {
         let inertia = point_inertia(&b);
         let point = [

@@ -64,7 +64,7 @@ impl Hardware {
         let SensorErrors { length_step_m, rate_step_m_s, length_noise_m, rate_noise_m_s } = self.sensor;
         let mut read = |values: [f64; LEGS], noise: f64, step: f64| {
             values.map(|value| {
-                let noise = if noise > 0.0 { noise * self.random.gaussian() } else { 0.0 };
+                let noise = if noise > 0.0 { noise * self.random.near_gaussian() } else { 0.0 };
                 rounded(value + noise, step)
             })
         };

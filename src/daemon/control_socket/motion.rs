@@ -12,7 +12,7 @@ use super::connection::Connection;
 use super::order::{Order, PendingOrder, REPLACED, Step, stop_count};
 use super::{MAX_WITHIN_S, Server, name_poses};
 use crate::motion_requests::job::{End, Job, Jog, MotionEvent, MotionInput};
-use crate::motion_requests::order::{Motion, MotionOrder};
+use crate::motion_requests::order::{MotionKind, MotionOrder};
 use crate::snapshot::Snapshot;
 use hexad_client::operator::motion_fields::GOTO;
 use hexad_client::operator::protocol::{AnswerLine, RequestLine, RequestResult, STOPPED};
@@ -113,8 +113,8 @@ impl Server<'_> {
         }
         if let Some(running) = &self.motions.running {
             let is_own = running.connection == connection.id;
-            if let (Motion::Jog(rates), true, None) =
-                (&order.motion, is_own && running.is_jog, &self.motions.next)
+            if let (MotionKind::Jog(rates), true, None) =
+                (&order.kind, is_own && running.is_jog, &self.motions.next)
             {
                 let jog = Jog { rates: *rates, coordinates: order.coordinates.clone(), time_ns };
                 if running.inputs.send(MotionInput::Jog(Box::new(jog))).is_ok() {
@@ -138,10 +138,10 @@ impl Server<'_> {
             connection: connection.id,
             process_id: peer.process_id,
             ends_with_connection: line.wait || line.request != GOTO,
-            waits: line.wait && !matches!(order.motion, Motion::Jog(_)),
+            waits: line.wait && !matches!(order.kind, MotionKind::Jog(_)),
             within_ns: (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64,
             engagement: None,
-            is_jog: matches!(order.motion, Motion::Jog(_)),
+            is_jog: matches!(order.kind, MotionKind::Jog(_)),
             blocked: String::new(),
             inputs,
             events,

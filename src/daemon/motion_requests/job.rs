@@ -159,7 +159,7 @@ impl Job {
             }
             let (now, _) = source.feed.observe()?;
             let is_new = since_ns.is_some_and(|since_ns| now.time_ns >= since_ns) && has_received(now, &x);
-            if is_new && now.reference.is_some_and(|reference| is_reached(&reference, &x)) {
+            if is_new && now.reference_or_pose.is_some_and(|reference| is_reached(&reference, &x)) {
                 return Ok(true);
             }
         }

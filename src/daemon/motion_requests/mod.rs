@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use self::job::{Job, JobFeed, MotionEvent};
-use self::order::Motion;
+use self::order::MotionKind;
 use self::snapshot_feed::SnapshotFeed;
 use super::parameters::constants;
 use super::snapshot::Snapshot;
@@ -63,9 +63,9 @@ fn carry_out(
         None => bus.insert(config.join()?),
     };
     let (constants, feed) = (constants(config), JobFeed::new(job, snapshots));
-    match &job.order.motion {
-        Motion::Goto(order) => goto::run(job, &constants, order, feed, bus),
-        Motion::Hold => hold::run(job, &constants, feed, bus).map(|()| None),
-        Motion::Jog(rates) => jog::run(job, &constants, *rates, feed, bus).map(|()| None),
+    match &job.order.kind {
+        MotionKind::Goto(order) => goto::run(job, &constants, order, feed, bus),
+        MotionKind::Hold => hold::hold_where_it_rests(job, &constants, feed, bus).map(|()| None),
+        MotionKind::Jog(rates) => jog::run(job, &constants, *rates, feed, bus).map(|()| None),
     }
 }

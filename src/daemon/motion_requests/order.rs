@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct MotionOrder {
     /// The motion.
-    pub motion: Motion,
+    pub kind: MotionKind,
     /// Coordinates of its numbers.
     pub coordinates: Coordinates,
     /// Whether it goes straight for the tool.
@@ -36,7 +36,7 @@ pub struct MotionOrder {
 
 /// What a request moves the platform to.
 #[derive(Clone, Copy, Debug)]
-pub enum Motion {
+pub enum MotionKind {
     /// To a target.
     Goto(GotoOrder),
     /// To rest.
@@ -69,12 +69,12 @@ impl MotionOrder {
     /// The motion of a line, with the frames and limits of a configuration.
     pub fn of_line(line: &RequestLine, config: &Config) -> Result<Self, String> {
         let motion = match line.request.as_str() {
-            GOTO => Motion::Goto(goto(line)?),
-            JOG => Motion::Jog(rates(line.rate, &config.deployment.limits.in_force())?),
-            _ => Motion::Hold,
+            GOTO => MotionKind::Goto(goto(line)?),
+            JOG => MotionKind::Jog(rates(line.rate, &config.deployment.limits.in_force())?),
+            _ => MotionKind::Hold,
         };
         let (coordinates, is_straight) = (coordinates(line, config)?, line.tool.is_some());
-        Ok(Self { motion, coordinates, is_straight, may_engage: line.engage })
+        Ok(Self { kind: motion, coordinates, is_straight, may_engage: line.engage })
     }
 }
 

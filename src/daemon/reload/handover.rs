@@ -87,7 +87,7 @@ impl<'q, 'o> Handover<'q, 'o> {
 
     /// Accepts or refuses an offer. Call it at the beginning of each cycle, before the controller's step.
     #[inline(never)]
-    pub fn begin_cycle(&mut self, controller: &mut Controller, woke_ns: u64) {
+    pub fn answer_offer(&mut self, controller: &mut Controller, woke_ns: u64) {
         self.cycle += 1;
         // Never true, but a queue divides by its length, and at each call the compiler must see that it is
         // not zero.
@@ -130,7 +130,7 @@ mod tests {
             let (mut offers, mut answers) = (OfferQueue::new(), OfferQueue::new());
             let ((mut offered, offers), (answers, mut answered)) = (offers.split(), answers.split());
             assert!(offered.enqueue(&mut offer).is_ok());
-            Handover::new(offers, answers, &io_parameters).begin_cycle(&mut controller, 1_000 + age_ns);
+            Handover::new(offers, answers, &io_parameters).answer_offer(&mut controller, 1_000 + age_ns);
             let found = answered.dequeue().map(|offer| offer.answer);
             assert_eq!(found, Some(answer), "{age_ns} ns after the offer");
         }

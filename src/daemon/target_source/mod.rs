@@ -53,8 +53,8 @@ pub fn held_x(config: &Config) -> Result<Option<[f64; 6]>, String> {
     }
     // Without setpoints, `on_violation = "limit"` holds the reference.
     let is_holding = DiagnosticCode::from_number(seen.code).is_some_and(DiagnosticCode::holds_pose);
-    let held = if is_holding { seen.reference } else { seen.target };
-    let (Some(held), Some(reference)) = (held, seen.reference) else {
+    let held = if is_holding { seen.reference_or_pose } else { seen.target };
+    let (Some(held), Some(reference)) = (held, seen.reference_or_pose) else {
         let state = seen.state.name();
         return Err(format!("the platform follows another source or a stop: the daemon is in {state}"));
     };
@@ -154,14 +154,14 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     /// X of the reference or of the platform now.
     pub fn present_x(&mut self) -> Result<[f64; 6], TargetError> {
         let (now, _) = self.feed.observe()?;
-        now.reference.ok_or_else(|| TargetError::UnknownPose(reason(&now.text)))
+        now.reference_or_pose.ok_or_else(|| TargetError::UnknownPose(reason(&now.text)))
     }
 
     /// X at which the platform comes to rest if it brakes now with the limits of autonomous motions. The
     /// present X, if that one is outside the workspace.
     pub fn resting_x(&mut self, constants: &Constants) -> Result<[f64; 6], TargetError> {
         let (newest, before) = self.feed.observe()?;
-        let of = |observation: &Observation| Some(pose_of(&observation.reference?));
+        let of = |observation: &Observation| Some(pose_of(&observation.reference_or_pose?));
         let now = of(newest).ok_or_else(|| TargetError::UnknownPose(reason(&newest.text)))?;
         let earlier = before.and_then(|before| {
             let interval_s = seconds_since(before.time_ns, newest.time_ns);

@@ -19,7 +19,7 @@ use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::random::Random;
 use hexad_core::model::regressor::{
-    INDISTINGUISHABLE_PAIRS, InertialParameters, inertial_parameters, regressor, rod_mass_null_direction,
+    INDISTINGUISHABLE_PAIRS, DynamicParameters, dynamic_parameters, regressor, rod_mass_null_direction,
 };
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::built_in::keeps_reserve;
@@ -126,7 +126,7 @@ fn about_home(machine: &Machine, displacement: &TaskState) -> TaskState {
 
 /// Independent coefficients of mean square 1, angles in radians and positions in radii of the joints.
 fn random_series(machine: &Machine, random: &mut Random) -> FourierSeries {
-    let mut coefficients = Coefficients::from_fn(|_, _| random.gaussian());
+    let mut coefficients = Coefficients::from_fn(|_, _| random.near_gaussian());
     coefficients.fixed_rows_mut::<3>(3).scale_mut(machine.joints.radius_m);
     FourierSeries(coefficients)
 }
@@ -140,8 +140,8 @@ fn pairs(machine: &Machine) -> impl Iterator<Item = [usize; 2]> {
 
 /// Value of each parameter as a base parameter: sums of pairs, and the rods' masses as points of the platform at the
 /// `B_i`.
-pub fn base_values(machine: &Machine) -> InertialParameters {
-    let mut values = inertial_parameters(machine);
+pub fn base_values(machine: &Machine) -> DynamicParameters {
+    let mut values = dynamic_parameters(machine);
     let rod_mass = values.get(ROD_MASS).copied().unwrap_or_default();
     values -= rod_mass_null_direction(machine) * rod_mass;
     for [first, second] in pairs(machine) {
@@ -202,7 +202,7 @@ impl Sensitivities {
     /// deviations before.
     pub fn deviations(
         &self,
-        before: &InertialParameters,
+        before: &DynamicParameters,
         noise_n: f64,
         count: f64,
     ) -> Option<Vec<(usize, f64)>> {

@@ -157,8 +157,8 @@ pub const FAILURES: &[Failure] = &[
     ("two legs exchanged, external pose", Part::Exchanged(Exchange::WithExternalPose, [LEG, LEG + 1])),
     sensor("one length reads zero", |m, _| m.length_m[LEG] = 0.0),
     sensor("one length is not a number", |m, _| m.length_m[LEG] = f64::NAN),
-    sensor("noise of 0.1 mm on one length", |m, c| m.length_m[LEG] += 1e-4 * c.random.gaussian()),
-    sensor("noise of 1 mm on one length", |m, c| m.length_m[LEG] += 1e-3 * c.random.gaussian()),
+    sensor("noise of 0.1 mm on one length", |m, c| m.length_m[LEG] += 1e-4 * c.random.near_gaussian()),
+    sensor("noise of 1 mm on one length", |m, c| m.length_m[LEG] += 1e-3 * c.random.near_gaussian()),
     sensor("one length in steps of 0.5 mm", |m, _| m.length_m[LEG] = (m.length_m[LEG] / 5e-4).round() * 5e-4),
     sensor("no measurements", |m, c| *m = c.first),
     sensor("every second measurement missing", |m, c| {

@@ -126,7 +126,7 @@ impl Genome {
             *gene = if random.uniform() < REDRAWN {
                 random.uniform()
             } else {
-                (*gene + deviation * random.gaussian()).clamp(0.0, 1.0)
+                (*gene + deviation * random.near_gaussian()).clamp(0.0, 1.0)
             };
         }
         next

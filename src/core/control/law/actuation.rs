@@ -31,7 +31,7 @@ pub(in crate::control) fn actuate(
     let mut sent = constants.acceleration_by_command.feedback_acceleration(&acceleration);
     let in_middle = at_begin.after(0.5 * parameters.period_s(), &sent);
     let error = errors.corrected_to_last_measurement(&in_middle);
-    let motion = parameters.law.dynamics_motion(desired, &error, &acceleration);
+    let motion = parameters.law.motion_for_inverse_dynamics(desired, &error, &acceleration);
     let force = forces(constants, &motion, &acceleration)?;
     let transmission = Transmission::of_motion(constants.machine(), &motion);
     let command = transmission.commands(&force);

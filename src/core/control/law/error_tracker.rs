@@ -2,7 +2,7 @@
 //!
 //! The error is taken at the instant of the measurement, where reference and platform are known. The
 //! [`estimator`](super::estimator) predicts it to the instant at which the force acts. Without a new
-//! measurement the checks use the prediction.
+//! measurement the checks use the prediction, in modes on legs the last measured error.
 
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
@@ -48,12 +48,12 @@ pub(in crate::control) struct ErrorTracker {
     /// Forces that the legs get by what was sent last \[N\], and its feedback acceleration.
     sent: [f64; LEGS],
     sent_acceleration: FeedbackAcceleration,
-    /// Measured error; without a new measurement, the predicted error.
+    /// Measured error; without a new measurement, the predicted error, in modes on legs the last measured one.
     error: PoseError,
     /// Measured minus estimated error, after the last measurement has corrected the estimate.
     post_fit_residual: Vector6<f64>,
     /// Fault of a sensor or drive at the last measurement, or an implausible innovation.
-    measurement_diagnostic: Option<Diagnostic>,
+    sensor_or_drive_fault: Option<Diagnostic>,
     /// Change of payload, impact or oscillation at the last measurement.
     disturbance_diagnostic: Option<Diagnostic>,
 }
@@ -63,7 +63,7 @@ impl ErrorTracker {
     /// platform's motion. Returns the error.
     pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> PoseError {
         self.estimator.start(&constants.estimator, measured_ns, begin_ns, &ErrorCoordinates::default());
-        (self.sensors, self.drives, self.measurement_diagnostic) =
+        (self.sensors, self.drives, self.sensor_or_drive_fault) =
             (FrozenSensors::default(), DriveResponse::default(), None);
         (self.disturbance, self.disturbance_diagnostic) = (DisturbanceMonitor::default(), None);
         self.friction = UnstatedFriction::default();
@@ -102,7 +102,7 @@ impl ErrorTracker {
                 check_innovation(constants, &innovation, interval_s, located)?;
                 drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
             };
-            self.measurement_diagnostic = check().err();
+            self.sensor_or_drive_fault = check().err();
             if constants.machine().actuator.friction_uncertainty_n > 0.0 {
                 let (_, rates) = leg_lengths_and_rates(constants.machine(), &desired.pose, &desired.twist);
                 friction.update(&rates, interval_s);
@@ -140,8 +140,8 @@ impl ErrorTracker {
     }
 
     /// Frozen sensor, implausible innovation or missing drive force at the last measurement.
-    pub fn measurement_diagnostic(&self) -> Option<&Diagnostic> {
-        self.measurement_diagnostic.as_ref()
+    pub fn sensor_or_drive_fault(&self) -> Option<&Diagnostic> {
+        self.sensor_or_drive_fault.as_ref()
     }
 
     /// Whether a measured length repeats, so that its sensor may be frozen.

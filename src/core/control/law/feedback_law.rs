@@ -148,10 +148,10 @@ impl Law {
     }
 
     /// Motion whose forces the mode commands. Computed torque: the predicted pose (reference minus predicted
-    /// error), the reference twist, and reference plus feedback acceleration. The twist is not the estimated
+    /// error), the reference twist, and reference plus commanded acceleration. The twist is not the estimated
     /// one, because friction forces of estimated rates would shake a platform at rest. Modes on legs: the
     /// desired motion.
-    pub(in crate::control) fn dynamics_motion(
+    pub(in crate::control) fn motion_for_inverse_dynamics(
         &self,
         desired: Motion,
         error: &ErrorCoordinates,

@@ -1,8 +1,8 @@
 //! Frozen sensors: readings that repeat to the last bit while the reference moves.
 //!
 //! The reading of a working sensor changes with noise and with each step of motion. Three equal readings in a
-//! row are a fault if the leg's reference has moved further than a bound since the first of them. A frozen
-//! sensor causes a false error that grows with the reference. The error moves the platform until it is
+//! row are a fault if the leg's reference has moved further than a bound since the second of them, and the feedback force
+//! has changed by more than friction may hold. A frozen sensor causes a false error that grows with the reference. The error moves the platform until it is
 //! detected, and slower motion takes longer to detect.
 //!
 //! A sensor whose noise is at least its resolution does not repeat at rest either. A sensor with less noise,
@@ -24,7 +24,7 @@ const MIN_EQUAL_READINGS: u32 = 3;
 const ALL_LEGS_BOUND_M: f64 = 54e-6;
 const ONE_LEG_BOUND_M: f64 = 83e-6;
 /// Square of the natural frequency of a 10 Hz loop \[1/s^2\].
-const BOUND_STIFFNESS: f64 = 3948.0;
+const BOUND_KP_PER_S2: f64 = 3948.0;
 /// Largest bound for one leg in a softer loop \[m\].
 const MAX_ONE_LEG_BOUND_M: f64 = 1.5e-4;
 /// Friction that the model may lack, relative to the largest force, with a reserve of a third: a fifth of
@@ -93,20 +93,20 @@ impl FrozenLegBounds {
 /// A reading with the error `v t` accelerates the platform by `Kp v t`. When the reference has moved by B,
 /// the platform is `Kp B^3 / (6 v^2)` off its path. The bound makes this the same for all loops. If friction
 /// holds a leg, the reference also moves further in a softer loop before the feedback force frees the leg.
-fn motion_bound(stiffness: f64) -> f64 {
-    (ONE_LEG_BOUND_M * libm::cbrt(BOUND_STIFFNESS / stiffness)).min(MAX_ONE_LEG_BOUND_M)
+fn motion_bound(kp_per_s2: f64) -> f64 {
+    (ONE_LEG_BOUND_M * libm::cbrt(BOUND_KP_PER_S2 / kp_per_s2)).min(MAX_ONE_LEG_BOUND_M)
 }
 
-/// Runs of equal readings, and the reference at the first reading of each run.
+/// Runs of equal readings, and the reference near the beginning of each run.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct FrozenSensors {
     last: [f64; LEGS],
     equal_readings: [u32; LEGS],
     /// Smallest change of a reading: a step of the sensor, or less \[m\].
     least_change: [f64; LEGS],
-    /// Reference lengths at the first of the equal readings \[m\].
+    /// Reference lengths at the second of the equal readings \[m\].
     reference: [f64; LEGS],
-    /// Feedback forces on the legs at the first of the equal readings \[N\].
+    /// Feedback forces on the legs at the second of the equal readings \[N\].
     feedback: [f64; LEGS],
 }
 

@@ -58,9 +58,9 @@ use crate::control::reference::history::History;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::step::{Step, inner_speeds};
 use crate::control::reference::proof::verification::Verifier;
-use crate::control::reference::proposal::approach::{Approach, TargetOffset, limit_leg_rates};
+use crate::control::reference::proposal::approach::{Approach, ApproachTarget, limit_leg_rates};
 use crate::control::reference::proposal::walls::Walls;
-use crate::control::reference::stop::constant_jerk::step_constant_jerk;
+use crate::control::reference::stop::constant_jerk::step_to_acceleration;
 use crate::control::reference::stop::held_stop::HeldStop;
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::setpoint::motion::{RelativeMotion, SetpointMotion};
@@ -300,7 +300,7 @@ impl ReferenceGenerator {
         }
         let change = self.motion.twist.vector() - begin;
         self.mean_acceleration = Acceleration::from_vector(&(change / duration_s));
-        self.bounds.tighten(constants, &self.motion.pose);
+        self.bounds.withdraw_relaxation(constants, &self.motion.pose);
     }
 
     // Out of line: inlined into the loop over the steps, it would keep a copy of the limits in memory.
@@ -315,7 +315,7 @@ impl ReferenceGenerator {
         let verified = desired.map(|(target, desired)| {
             let (Acceleration { angular, linear }, effort) =
                 self.proposed(constants, target, &desired, step_s);
-            step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
+            step_to_acceleration(&mut self.motion, &angular, &linear, step_s);
             let Self { strength: strength_share, .. } = *self;
             let inner_speeds = inner_speeds(&begin, &self.motion, step_s);
             let step =
@@ -377,12 +377,12 @@ impl ReferenceGenerator {
         let led = Twist::from_vector(&(v + a * h));
         let offset = desired.displacement - (v + a * (0.5 * h)) * h;
         let offset = Twist::from_vector(&offset);
-        let orientation = TargetOffset {
+        let orientation = ApproachTarget {
             offset: offset.angular,
             target_velocity: desired.twist.angular,
             target_acceleration: desired.acceleration.angular,
         };
-        let position = TargetOffset {
+        let position = ApproachTarget {
             offset: offset.linear,
             target_velocity: desired.twist.linear,
             target_acceleration: desired.acceleration.linear,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
-use crate::control::sensing::last_valid::{LastValid, check_stroke_with_tolerance, check_time_stamp};
+use crate::control::sensing::last_input::{LastInput, check_stroke_with_tolerance, check_time_stamp};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::{DriveStatus, Measurement};
 use crate::control::signals::time::seconds_between;
@@ -99,10 +99,10 @@ impl RateConsistency {
 /// First stage of the cycle: validates each new measurement and keeps the last valid one.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct MeasurementValidator {
-    last: LastValid<Measurement, Measurement>,
+    last: LastInput<Measurement, Measurement>,
     consistency: RateConsistency,
     /// Cycles under control without a new valid measurement.
-    pub missed_cycles: u64,
+    pub cycles_without_valid: u64,
     /// Release of the cycle before \[ns\]; 0 before the first.
     released_before_ns: u64,
     /// Release of this cycle \[ns\].
@@ -123,7 +123,7 @@ impl MeasurementValidator {
         let has_bus_failed = fault & DriveStatus::BUS_FAILED != 0;
         let new = newest.filter(|newest| !has_bus_failed && self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
-        self.missed_cycles += u64::from(cycle.state.has_control() && !is_accepted);
+        self.cycles_without_valid += u64::from(cycle.state.has_control() && !is_accepted);
         // Before any consequence of it.
         if has_bus_failed {
             return Err(DiagnosticCode::DriveBusFailed.into());

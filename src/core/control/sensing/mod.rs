@@ -3,7 +3,7 @@
 //! | step | file |
 //! | --- | --- |
 //! | check the clock of the stamps | `stamp_clock` |
-//! | validate the measurement | `measurement`, with `last_valid` |
+//! | validate the measurement | `measurement`, with `last_input` |
 //! | check drives and external pose | `drive_monitor`, `external_pose` |
 //! | leg rates | `leg_rates` |
 //! | pose and twist | [`localization`] |
@@ -12,7 +12,7 @@
 pub(super) mod drive_monitor;
 pub(super) mod external_pose;
 pub(super) mod free_motion;
-pub(super) mod last_valid;
+pub(super) mod last_input;
 pub(super) mod leg_rates;
 pub mod localization;
 pub(super) mod measurement;

@@ -14,7 +14,7 @@ pub(in crate::control) struct ValidatedSetpoint<'a> {
     pub target: Option<Target<'a>>,
     /// Whether the valid setpoint may be followed: recent enough, and after a loss near enough.
     pub follow_check: Result<(), Diagnostic>,
-    /// Limits that the newest setpoint is near.
+    /// Limits that the newest setpoint is near; none with policy `limit`, where the reference has its own.
     pub active_limits: LimitSet,
     /// Whether the valid setpoint keeps the limits, as "stop" demands.
     pub keeps_limits: bool,

@@ -23,7 +23,7 @@ use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::ReferenceGenerator;
-use crate::control::sensing::last_valid::{LastValid, check_stroke, check_time_stamp};
+use crate::control::sensing::last_input::{LastInput, check_stroke, check_time_stamp};
 use crate::control::setpoint::motion::SetpointMotion;
 use crate::control::setpoint::pose_samples::PoseSamples;
 use crate::control::setpoint::target::Target;
@@ -48,14 +48,14 @@ const JUMP_RATIO: f64 = 0.5;
 /// First stage of the cycle: validates each new setpoint and keeps the last valid one.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct SetpointValidator {
-    last: LastValid<Setpoint, SetpointMotion>,
+    last: LastInput<Setpoint, SetpointMotion>,
     samples: PoseSamples,
     /// Limits that the newest setpoint is near, under "stop".
     active_limits: LimitSet,
     /// Whether the valid setpoint keeps the limits, as "stop" demands.
     keeps_limits: bool,
     /// Cycles under control without a new valid setpoint.
-    pub missed_cycles: u64,
+    pub cycles_without_valid: u64,
 }
 
 impl SetpointValidator {
@@ -74,7 +74,7 @@ impl SetpointValidator {
             new.set_jerk_from_previous(parameters, self.last.valid.as_ref());
             self.accept(cycle, &new, reference)
         });
-        self.missed_cycles += u64::from(cycle.state.has_control() && !is_accepted);
+        self.cycles_without_valid += u64::from(cycle.state.has_control() && !is_accepted);
         let valid = self.last.valid.as_ref();
         let target = valid.map(|valid| Target::of_setpoint(valid, &self.samples));
         ValidatedSetpoint {
@@ -91,7 +91,7 @@ impl SetpointValidator {
 
     /// Forgets every setpoint. The newest is then validated again.
     pub fn forget(&mut self) {
-        *self = Self { missed_cycles: self.missed_cycles, ..Self::default() };
+        *self = Self { cycles_without_valid: self.cycles_without_valid, ..Self::default() };
     }
 
     /// Whether the valid setpoint is recent enough to be followed. A target has no end and stays valid while

@@ -109,7 +109,7 @@ macro_rules! codes {
             }
 
             /// What it means, in whole sentences.
-            pub fn cause(self) -> &'static str {
+            pub fn meaning(self) -> &'static str {
                 match self { $(Self::$variant => concat!($($doc),*),)* }
             }
 

@@ -38,7 +38,7 @@ pub(in crate::control) struct Evidence<'a> {
     pub is_ready: bool,
     pub feedback: &'a FeedbackLimiter,
     /// Disagreement of the last measurement with its prediction, or a frozen sensor.
-    pub measurement_diagnostic: Option<&'a Diagnostic>,
+    pub sensor_or_drive_fault: Option<&'a Diagnostic>,
     /// Change of the payload or the surroundings, or an oscillation of the platform.
     pub disturbance_diagnostic: Option<&'a Diagnostic>,
     /// Whether a length repeats itself: its sensor may be frozen.
@@ -92,7 +92,7 @@ fn check_tracking(
 ) -> Result<(), Diagnostic> {
     let Evidence { input, setpoint, error, feedback, .. } = evidence;
     check_drives_and_external_pose(evidence)?;
-    if let Some(diagnostic) = evidence.measurement_diagnostic {
+    if let Some(diagnostic) = evidence.sensor_or_drive_fault {
         return Err(*diagnostic);
     }
     check_following_error(&cycle.constants.parameters, *error, active_limits)?;

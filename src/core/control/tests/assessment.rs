@@ -71,7 +71,7 @@ impl Scene {
             localization: located.map(drop),
             error: self.error.as_ref(),
             feedback: &self.feedback,
-            measurement_diagnostic: self.measurement_diagnostic.as_ref(),
+            sensor_or_drive_fault: self.measurement_diagnostic.as_ref(),
             disturbance_diagnostic: self.disturbance_diagnostic.as_ref(),
             drive_and_pose_checks: &self.reports,
             is_ready: self.is_ready,

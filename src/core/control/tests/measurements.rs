@@ -116,10 +116,10 @@ fn lengths_change_no_faster_than_a_drive_under_an_external_force() {
                 assert_eq!(bench.accepts(MS, &new), is_accepted, "{state:?} {sign} {share}");
                 // A rejected measurement counts as missing.
                 let missed = u64::from(state == State::Active && !is_accepted);
-                assert_eq!(bench.validator.missed_cycles, missed);
+                assert_eq!(bench.validator.cycles_without_valid, missed);
                 // The same message is not validated twice.
                 let _ = bench.validate(2 * MS, Some(&new));
-                assert_eq!(bench.validator.missed_cycles, missed + u64::from(state == State::Active));
+                assert_eq!(bench.validator.cycles_without_valid, missed + u64::from(state == State::Active));
             }
         }
     }

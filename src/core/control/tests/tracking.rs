@@ -46,7 +46,7 @@ fn a_leg_that_leaves_the_prediction_ends_the_trust() {
             let mut tracker = ErrorTracker::default();
             let displacement = Twist { linear: direction * (distance * bound), ..Twist::default() };
             updated(&constants, &mut tracker, &[(1, displacement)]);
-            let found = tracker.measurement_diagnostic().copied();
+            let found = tracker.sensor_or_drive_fault().copied();
             assert_eq!(found.is_none(), is_trusted, "{axis} {distance}");
             if let Some(found) = found {
                 assert_eq!(found.code, DiagnosticCode::MeasurementImplausible);

@@ -228,7 +228,7 @@ impl<S: Simd> Poses<S> {
         let k = f64x8::splat(simd, 2.0) / (f64x8::splat(simd, 1.0) + u.dot(u));
         let Matrix([x, y, z]) = self.rotation;
         Self {
-            rotation: Matrix([x.turned(u, k), y.turned(u, k), z.turned(u, k)]),
+            rotation: Matrix([x.cayley_rotated(u, k), y.cayley_rotated(u, k), z.cayley_rotated(u, k)]),
             center: self.center + *linear,
         }
     }

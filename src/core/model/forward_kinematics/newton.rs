@@ -63,9 +63,9 @@ impl<S: Simd> Iterate<S> {
         let u = step.angular * half;
         let k = f64x4::splat(simd, 2.0) / (f64x4::splat(simd, 1.0) + u.dot(u));
         Self {
-            arm: self.arm.turned(u.doubled(), k.combine(k)),
+            arm: self.arm.cayley_rotated(u.doubled(), k.combine(k)),
             reach: self.reach + step.linear.doubled(),
-            rotation: self.rotation.turned(u, k),
+            rotation: self.rotation.cayley_rotated(u, k),
         }
     }
 

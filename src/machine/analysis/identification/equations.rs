@@ -14,12 +14,12 @@ use super::samples::MotionSample;
 use hexad_core::model::LEGS;
 use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::machine::Machine;
-use hexad_core::model::regressor::{PARAMETER_COUNT, Regressor, regressor};
+use hexad_core::model::regressor::{DYNAMIC_PARAMETER_COUNT, Regressor, regressor};
 
 /// Parameters of a rigid body: mass, first moments, inertia about C.
 pub(super) const BODY: usize = 10;
 /// First of the force scales s, of their products with the load friction, and of the parameters of the payload.
-pub(super) const SCALE: usize = PARAMETER_COUNT;
+pub(super) const SCALE: usize = DYNAMIC_PARAMETER_COUNT;
 pub(super) const LOSS: usize = SCALE + LEGS;
 pub(super) const PAYLOAD: usize = LOSS + LEGS;
 pub(super) const UNKNOWNS: usize = PAYLOAD + BODY;
@@ -106,7 +106,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
             let mean = |sum: f64| sum / GROUP as f64;
             let body = row.fixed_columns::<BODY>(0);
             let mut coefficients = Unknowns::zeros();
-            coefficients.fixed_rows_mut::<PARAMETER_COUNT>(0).copy_from(&-row.transpose());
+            coefficients.fixed_rows_mut::<DYNAMIC_PARAMETER_COUNT>(0).copy_from(&-row.transpose());
             coefficients.fixed_rows_mut::<1>(SCALE + leg).fill(mean(commands().sum()));
             coefficients.fixed_rows_mut::<1>(LOSS + leg).fill(-sign * mean(commands().map(f64::abs).sum()));
             if *load == Load::Payload {

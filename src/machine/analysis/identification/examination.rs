@@ -23,7 +23,7 @@ use super::parameters::{FREE, Free, LOG_SCALE, Parameters};
 use super::{Load, Run};
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::Machine;
-use hexad_core::model::regressor::inertial_parameters;
+use hexad_core::model::regressor::dynamic_parameters;
 
 /// Time over which residuals are alike at most \[s\].
 const BLOCK_S: f64 = 1.0;
@@ -112,7 +112,7 @@ impl Rows {
         let (mut j, mut h, mut r, mut blocks, mut causes) = (vec![], vec![], vec![], vec![], vec![]);
         let mut commands = 0.0;
         for (run, equations) in runs {
-            let mut with_load = inertial_parameters(machine);
+            let mut with_load = dynamic_parameters(machine);
             let payload = unknowns.fixed_rows::<BODY>(PAYLOAD) * f64::from(run.load == Load::Payload);
             let mut body = with_load.fixed_rows_mut::<BODY>(0);
             body += run.load.parameters() + payload;

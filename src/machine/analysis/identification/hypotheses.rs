@@ -12,7 +12,7 @@ use hexad_core::model::LEGS;
 use hexad_core::model::inverse_geometry::{leg_directions, leg_motion};
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::machine::{Joints, Machine};
-use hexad_core::model::regressor::{InertialParameters, Regressor, regressor};
+use hexad_core::model::regressor::{DynamicParameters, Regressor, regressor};
 use hexad_core::model::rigid::{Acceleration, Motion, Twist};
 use serde::Serialize;
 
@@ -174,7 +174,7 @@ impl<'a> Hypotheses<'a> {
     pub fn columns(
         &self,
         group: &[MotionSample],
-        parameters: &InertialParameters,
+        parameters: &DynamicParameters,
         (time, stops): (f64, &[[f64; 2]; 2]),
     ) -> Option<Vec<Column>> {
         let machine = self.machine;

@@ -23,7 +23,7 @@ use crate::analysis::excitation_design::base_values;
 use hexad_core::model::LEGS;
 use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::machine::{Machine, Platform};
-use hexad_core::model::regressor::InertialParameters;
+use hexad_core::model::regressor::DynamicParameters;
 use hexad_core::motion::excitation::PERIOD_S;
 
 mod equations;
@@ -118,10 +118,10 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
 
 /// How far a machine may be from its file before anything is recorded: standard deviations of its base parameters, see
 /// [`base_values`].
-pub fn expected_deviations(file: &Machine) -> InertialParameters {
+pub fn expected_deviations(file: &Machine) -> DynamicParameters {
     let parameters = Parameters::new(file);
     let at = |free: &Free| base_values(&parameters.bodies(free).machine);
-    let mut squares = InertialParameters::zeros();
+    let mut squares = DynamicParameters::zeros();
     for (index, deviation) in parameters.deviation.iter().enumerate() {
         let step = Free::from_fn(|row, _| if row == index { DIFFERENCE * deviation } else { 0.0 });
         let change = at(&(parameters.prior + step)) - at(&(parameters.prior - step));

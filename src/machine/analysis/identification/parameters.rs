@@ -29,7 +29,7 @@ use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 use super::equations::{BODY, LOSS, PAYLOAD, SCALE, Unknowns};
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::{Link, Machine, Platform};
-use hexad_core::model::regressor::{PARAMETER_COUNT, inertial_parameters};
+use hexad_core::model::regressor::{DYNAMIC_PARAMETER_COUNT, dynamic_parameters};
 
 /// First parameter of each group.
 const CYLINDER: usize = BODY;
@@ -176,10 +176,10 @@ impl Parameters {
         let loss =
             actuator.force_scale.iter().zip(&actuator.load_friction_share).map(|(scale, load)| scale * load);
         let mut unknowns = Unknowns::zeros();
-        unknowns.fixed_rows_mut::<PARAMETER_COUNT>(0).copy_from(&inertial_parameters(&machine));
+        unknowns.fixed_rows_mut::<DYNAMIC_PARAMETER_COUNT>(0).copy_from(&dynamic_parameters(&machine));
         unknowns.fixed_rows_mut::<LEGS>(SCALE).copy_from(&Vector6::from(actuator.force_scale));
         unknowns.fixed_rows_mut::<LEGS>(LOSS).copy_from(&Vector6::from_iterator(loss));
-        let payload = inertial_parameters(&Machine { platform: payload, ..machine });
+        let payload = dynamic_parameters(&Machine { platform: payload, ..machine });
         unknowns.fixed_rows_mut::<BODY>(PAYLOAD).copy_from(&payload.fixed_rows::<BODY>(0));
         unknowns
     }

@@ -48,7 +48,8 @@ impl ErrorEstimate {
     }
 }
 
-/// Kalman filter of six axes: estimate at the instant of the last measurement, and its covariance.
+/// Kalman filter of six axes: estimate at the instant of the last measurement, or of the start if there was none since, and its
+/// covariance.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct KalmanFilter {
     pub state: ErrorEstimate,
@@ -184,17 +185,17 @@ impl Estimator {
         Some(filter.correct(constants, time_ns, measured))
     }
 
-    /// Time from the last measurement to an instant \[s\].
+    /// Time from the last measurement, or from the start, to an instant \[s\].
     pub fn interval_s(&self, time_ns: u64) -> f64 {
         seconds_between(self.filter.time_ns, time_ns)
     }
 
-    /// Estimate at the instant of the last measurement.
+    /// Estimate at the instant of the last measurement, or of the start.
     pub fn at_measurement(&self) -> &ErrorEstimate {
         &self.filter.state
     }
 
-    /// Advances an estimate from the instant of the last measurement to a later one.
+    /// Advances an estimate from that instant to a later one.
     pub fn predict(&self, state: &mut ErrorEstimate, instant_ns: u64) {
         self.sent.advance(state, self.filter.time_ns, instant_ns);
     }

@@ -24,7 +24,7 @@ use crate::control::parameters::Envelope;
 use crate::control::reference::stop::vector_stop::Stop;
 
 /// Largest margin, as a ratio of the width of a range.
-pub(in crate::control::reference) const MAX_MARGIN_RATIO: f64 = 0.25;
+pub(in crate::control::reference) const MARGIN_CAP_RATIO: f64 = 0.25;
 
 /// Largest change of an angle along a motion \[rad\].
 const MAX_CHANGE: f64 = 2.5;
@@ -65,7 +65,7 @@ impl AngleRanges {
             is_nonempty: true,
         };
         for (axis, (x, (low, high))) in x.iter().zip(lowest.iter().zip(highest)).take(3).enumerate() {
-            let margin = (MAX_MARGIN_RATIO * (high - low)).min(1.0);
+            let margin = (MARGIN_CAP_RATIO * (high - low)).min(1.0);
             let (reached_low, reached_high) = (low.max(x - MAX_CHANGE), high.min(x + MAX_CHANGE));
             let width = reached_high - reached_low;
             ranges.is_nonempty &= width >= 0.0;
@@ -172,7 +172,7 @@ mod tests {
             let room = |margin: f64| {
                 let axes = angles.iter().zip(envelope.lowest.iter().zip(&envelope.highest)).take(3);
                 axes.map(|(x, (low, high))| {
-                    (x - low).min(high - x) - margin.min(MAX_MARGIN_RATIO * (high - low))
+                    (x - low).min(high - x) - margin.min(MARGIN_CAP_RATIO * (high - low))
                 })
                 .fold(f64::INFINITY, f64::min)
             };

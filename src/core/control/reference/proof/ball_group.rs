@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::reference::proof::drive_forces::CenterDistance;
-use crate::control::reference::proof::regularity::{Ball, Reach, Regularity};
+use crate::control::reference::proof::regularity::{CenterConditioning, Reach, Regularity};
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::MAX_WRENCH_NORM;
 
@@ -34,7 +34,7 @@ pub(super) struct BallGroup {
 
 impl BallGroup {
     /// Puts a ball around a pose into a lane.
-    pub fn set(&mut self, lane: usize, center: &Pose, ball: &Ball) {
+    pub fn set(&mut self, lane: usize, center: &Pose, ball: &CenterConditioning) {
         let put = |column: &mut [f64; LANES], number: f64| {
             if let Some(lane) = column.get_mut(lane) {
                 *lane = number;

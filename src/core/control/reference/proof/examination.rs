@@ -27,12 +27,12 @@ use crate::control::reference::proof::cubic_departure::{
 use crate::control::reference::proof::drive_forces::ForceProof;
 use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTERVALS};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::proof::position_ranges::PositionRanges;
+use crate::control::reference::proof::position_ranges::PositionEnvelope;
 use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{REGULARITY_EFFORT, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
-use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_RATIO, ROUNDING};
+use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_RATIO, VELOCITY_ROUNDING_RATIO};
 use crate::control::reference::stop::pose_stop::{
     PoseStop, PoseStopState, advanced_without_orthonormalizing,
 };
@@ -73,7 +73,7 @@ pub(in crate::control::reference) struct StopExamination<'a> {
     /// Whether rates could exceed their limit; ranges of the envelope for positions, and for angles if these
     /// could leave it.
     needs_rates: bool,
-    positions: Option<PositionRanges>,
+    positions: Option<PositionEnvelope>,
     angles: Option<AngleRanges>,
     /// Pose at the start of the step, and how far its lengths exceed their bounds \[m\]. If rounding put the
     /// start slightly beyond a bound, the stop may be equally far beyond. Otherwise the reference could not
@@ -105,7 +105,7 @@ impl<'a> StopExamination<'a> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
-        let allowed = 1.0 + ROUNDING;
+        let allowed = 1.0 + VELOCITY_ROUNDING_RATIO;
         let inner = &step.inner_speeds;
         let is_slow = v.max(inner.linear) <= allowed * position.velocity
             && w.max(inner.angular) <= allowed * orientation.velocity;
@@ -142,7 +142,7 @@ impl<'a> StopExamination<'a> {
             step_s: step.duration_s,
             directions: u.abs() * 2.0 + e.abs(),
             needs_rates,
-            positions: bounds.envelope.as_ref().map(PositionRanges::new),
+            positions: bounds.envelope.as_ref().map(PositionEnvelope::new),
             angles: bounds
                 .envelope
                 .as_ref()
@@ -338,7 +338,7 @@ impl<'a> StopExamination<'a> {
         });
         relaxed != envelope
             && dispatch!(level, simd => {
-                PositionRanges::new(relaxed).contain(simd, [&pose.position; 2], &Vector3::zeros())
+                PositionEnvelope::new(relaxed).contain(simd, [&pose.position; 2], &Vector3::zeros())
                     && angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING_RAD)
             })
     }

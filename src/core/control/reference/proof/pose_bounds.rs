@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::drive_forces::ForceBounds;
-use crate::control::reference::proof::tolerances::{END_STOP_RATIO, ROUNDING, START_RATIO};
+use crate::control::reference::proof::tolerances::{END_STOP_RATIO, RANGE_ROUNDING, START_RATIO};
 use crate::model::LEGS;
 use crate::model::drive_loads::DriveLoads;
 use crate::model::inverse_geometry::leg_lengths;
@@ -33,8 +33,8 @@ impl PoseBounds {
             shortest_m: [actuator.min_length_m + parameters.stroke_margin_m; LEGS],
             longest_m: [actuator.max_length_m - parameters.stroke_margin_m; LEGS],
             envelope: parameters.envelope.map(|Envelope { lowest, highest }| Envelope {
-                lowest: lowest.map(|x| x - ROUNDING),
-                highest: highest.map(|x| x + ROUNDING),
+                lowest: lowest.map(|x| x - RANGE_ROUNDING),
+                highest: highest.map(|x| x + RANGE_ROUNDING),
             }),
             forces: ForceBounds::new(constants.machine()),
             is_relaxed: false,
@@ -79,7 +79,7 @@ impl PoseBounds {
     }
 
     /// Moves relaxed bounds inward to a pose, at most to the nominal bounds, and never outward.
-    pub fn tighten(&mut self, constants: &Constants, pose: &Pose) {
+    pub fn withdraw_relaxation(&mut self, constants: &Constants, pose: &Pose) {
         if !self.is_relaxed {
             return;
         }

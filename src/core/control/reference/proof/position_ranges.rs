@@ -5,24 +5,24 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 use nalgebra::Vector3;
 
 use crate::control::parameters::Envelope;
-use crate::control::reference::proof::angle_ranges::MAX_MARGIN_RATIO;
+use crate::control::reference::proof::angle_ranges::MARGIN_CAP_RATIO;
 use crate::control::reference::proof::padding::{Padded, padded};
 
 /// Ranges of the coordinates of C \[m\]. The fourth range is zero and contains the zero of a padded vector.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::control::reference) struct PositionRanges {
+pub(in crate::control::reference) struct PositionEnvelope {
     lowest: Padded,
     highest: Padded,
     /// Largest margin that is required from each end.
-    max_margin: Padded,
+    margin_cap_m: Padded,
 }
 
-impl PositionRanges {
+impl PositionEnvelope {
     /// Ranges of an envelope.
     pub fn new(Envelope { lowest: [.., x0, y0, z0], highest: [.., x1, y1, z1] }: &Envelope) -> Self {
         let (low, high) = (Vector3::new(*x0, *y0, *z0), Vector3::new(*x1, *y1, *z1));
-        let max_margin = (high - low) * MAX_MARGIN_RATIO;
-        Self { lowest: padded(&low), highest: padded(&high), max_margin: padded(&max_margin) }
+        let max_margin = (high - low) * MARGIN_CAP_RATIO;
+        Self { lowest: padded(&low), highest: padded(&high), margin_cap_m: padded(&max_margin) }
     }
 
     /// Whether each coordinate of both positions keeps a margin from the ends of its range. The margin is at
@@ -32,7 +32,7 @@ impl PositionRanges {
         let load = |lanes: Padded| f64x4::load_array(simd, lanes);
         let [first, second] = positions.map(|position| load(padded(position)));
         let room = (first.min(second) - load(self.lowest)).min(load(self.highest) - first.max(second));
-        room.simd_ge(load(padded(margin_m)).min(load(self.max_margin))).all_true()
+        room.simd_ge(load(padded(margin_m)).min(load(self.margin_cap_m))).all_true()
     }
 }
 
@@ -48,7 +48,7 @@ mod tests {
     fn each_end_is_kept_by_both_positions() {
         let envelope =
             Envelope { lowest: [9.0, 9.0, 9.0, -1.0, 1.0, 0.0], highest: [9.0, 9.0, 9.0, 2.0, 3.0, 1e-3] };
-        let ranges = PositionRanges::new(&envelope);
+        let ranges = PositionEnvelope::new(&envelope);
         let middle = Vector3::new(0.5, 2.0, 5e-4);
         let slacks = [0.3, 0.1, 0.1];
         let kept = [0.3, 0.1, 2.5e-4];

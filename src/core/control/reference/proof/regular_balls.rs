@@ -7,7 +7,7 @@ use crate::control::constants::Constants;
 use crate::control::reference::proof::ball_group::{BallGroup, Coverage, LANES};
 use crate::control::reference::proof::drive_forces::{BallLoads, CenterDistance, ForceProof};
 use crate::control::reference::proof::refusal::Refusal;
-use crate::control::reference::proof::regularity::{Ball, Reach, Regularity, RegularityQuery};
+use crate::control::reference::proof::regularity::{CenterConditioning, Reach, Regularity, RegularityQuery};
 use crate::control::signals::limits::Limit;
 use crate::model::rigid::Pose;
 
@@ -121,7 +121,7 @@ impl RegularBalls {
         effort: &mut u32,
     ) -> Result<Regularity, Refusal> {
         let RegularityQuery { pose, reach, required } = around;
-        let ball = Ball::new(constants, pose, effort)?;
+        let ball = CenterConditioning::new(constants, pose, effort)?;
         let (slot, index) = (self.next_slot, self.next_slot / LANES);
         let group = self.groups.get_mut(index).ok_or(Refusal::Effort)?;
         group.set(slot % LANES, pose, &ball);

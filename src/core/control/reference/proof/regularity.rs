@@ -45,7 +45,7 @@ pub(in crate::control::reference) struct Regularity {
 impl Regularity {
     /// Regularity of a pose. It is refused if the effort does not suffice.
     pub fn at(constants: &Constants, pose: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
-        Ball::new(constants, pose, effort).map(|ball| ball.regularity)
+        CenterConditioning::new(constants, pose, effort).map(|ball| ball.regularity)
     }
 
     /// Bounds that the reference must keep.
@@ -75,7 +75,7 @@ impl Regularity {
     }
 }
 /// Ball without its centre.
-pub(super) struct Ball {
+pub(super) struct CenterConditioning {
     pub norm: f64,
     pub inverse_norm: f64,
     pub shortest_m: f64,
@@ -84,7 +84,7 @@ pub(super) struct Ball {
     pub loads: BallLoads,
 }
 
-impl Ball {
+impl CenterConditioning {
     /// Ball around a pose, refused if the effort does not suffice. Only the factorization shows whether
     /// pivots are needed: their effort is subtracted afterwards.
     pub fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {

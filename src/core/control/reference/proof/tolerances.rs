@@ -19,10 +19,11 @@ pub(in crate::control::reference) const END_STOP_RATIO: f64 = BETWEEN_KNOTS_RATI
 /// Distance that walls keep from a bound, as a part of the stroke: it gives the examination room between
 /// knots.
 pub(in crate::control::reference) const WALL_RATIO: f64 = 5e-3;
-/// Allowance for rounding: relative for a velocity, absolute in \[rad\] or \[m\] for a range whose ends are
-/// equal.
-pub(in crate::control::reference) const ROUNDING: f64 = 1e-9;
+/// Allowance for the rounding of a velocity, as a part of its limit.
+pub(in crate::control::reference) const VELOCITY_ROUNDING_RATIO: f64 = 1e-9;
+/// Allowance for rounding at each end of the envelope \[rad\] or \[m\]; a range whose ends are equal needs it.
+pub(in crate::control::reference) const RANGE_ROUNDING: f64 = 1e-9;
 /// Allowance for the rounding of an angle \[rad\].
 pub(in crate::control::reference) const ANGLE_ROUNDING_RAD: f64 = 1e-15;
 
-const _: () = assert!(WALL_RATIO > 100.0 * BETWEEN_KNOTS_RATIO && ANGLE_ROUNDING_RAD < ROUNDING);
+const _: () = assert!(WALL_RATIO > 100.0 * BETWEEN_KNOTS_RATIO && ANGLE_ROUNDING_RAD < RANGE_ROUNDING);

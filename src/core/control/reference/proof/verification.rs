@@ -15,7 +15,7 @@ use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
-use crate::control::reference::proof::tolerances::ROUNDING;
+use crate::control::reference::proof::tolerances::VELOCITY_ROUNDING_RATIO;
 use crate::control::reference::stop::acceleration_ranges::AccelerationRanges;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::stop::vector_stop::{StopExtent, release_first_extent};
@@ -47,7 +47,7 @@ impl Verifier {
         let limits = constants.parameters.limits.with_accelerations_scaled(step.strength_share);
         let turn = release_first_extent(&twist.angular, &acceleration.angular, &limits.orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, &limits.position);
-        let (inner, allowed) = (&step.inner_speeds, 1.0 + ROUNDING);
+        let (inner, allowed) = (&step.inner_speeds, 1.0 + VELOCITY_ROUNDING_RATIO);
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
         let around = RegularityQuery {
             pose,

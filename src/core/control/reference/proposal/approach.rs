@@ -45,12 +45,12 @@ const NEWTON_STEPS: u32 = 4;
 /// Least square root of a velocity: a step divides by it.
 const SMALLEST_ROOT: f64 = 1e-150;
 
-/// Target of one vector at the next instant, relative to the state that the present acceleration leads to.
+/// Target of one vector at the next instant.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::control::reference) struct TargetOffset {
-    /// `e`.
+pub(in crate::control::reference) struct ApproachTarget {
+    /// `e`: the target less the value that the present acceleration leads to.
     pub offset: Vector3<f64>,
-    /// `v_t` and `a_t`.
+    /// `v_t` and `a_t`, of the target itself.
     pub target_velocity: Vector3<f64>,
     pub target_acceleration: Vector3<f64>,
 }
@@ -92,7 +92,7 @@ impl Approach {
     /// Wanted velocities of two vectors. `ahead`: the velocities that the present accelerations lead to.
     pub fn wanted(
         approaches: Pair<&Self>,
-        targets: Pair<&TargetOffset>,
+        targets: Pair<&ApproachTarget>,
         ahead: Pair<&Vector3<f64>>,
     ) -> Pair<WantedVelocity> {
         let distances = targets.map(|target| target.offset.norm());
@@ -105,7 +105,7 @@ impl Approach {
 
     fn wanted_at(
         &self,
-        TargetOffset { offset, target_velocity, target_acceleration }: &TargetOffset,
+        ApproachTarget { offset, target_velocity, target_acceleration }: &ApproachTarget,
         ahead: &Vector3<f64>,
         distance: f64,
         root: f64,

@@ -6,7 +6,7 @@ use crate::model::rigid::{Motion, Twist};
 
 /// Advances a motion by `dt_s` seconds, in which its acceleration changes linearly to `angular_at_end` and `linear_at_end`. In
 /// place, because a copy would have to wait for the values just written.
-pub(in crate::control::reference) fn step_constant_jerk(
+pub(in crate::control::reference) fn step_to_acceleration(
     motion: &mut Motion,
     angular_at_end: &Vector3<f64>,
     linear_at_end: &Vector3<f64>,

@@ -1,7 +1,7 @@
 //! Tests of the braking curves against their equations, and of derivatives against differences.
 
 use crate::control::reference::proposal::approach::{
-    Approach, TargetOffset, WantedVelocity, limit_leg_rates,
+    Approach, ApproachTarget, WantedVelocity, limit_leg_rates,
 };
 use crate::control::reference::tests::*;
 
@@ -59,13 +59,13 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
         let [target_velocity, ahead, target_acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
         let at = |dt: f64| {
             let offset = offset + (target_velocity - ahead) * dt + target_acceleration * (0.5 * dt * dt);
-            let target = TargetOffset {
+            let target = ApproachTarget {
                 offset,
                 target_velocity: target_velocity + target_acceleration * dt,
                 target_acceleration,
             };
             // The target of the other vector does not matter.
-            let beside = TargetOffset { offset: 3.0 * offset, ..target };
+            let beside = ApproachTarget { offset: 3.0 * offset, ..target };
             let both = Pair { angular: &ahead, linear: &ahead };
             let approaches = Pair { angular: &approach, linear: &other };
             let wanted =

@@ -2,7 +2,7 @@
 //! steps.
 
 use crate::control::reference::history::History;
-use crate::control::reference::stop::constant_jerk::step_constant_jerk;
+use crate::control::reference::stop::constant_jerk::step_to_acceleration;
 use crate::control::reference::tests::*;
 
 /// Motion around home in every coordinate.
@@ -175,7 +175,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
         let end = if sign < 0.0 { before[1][0] - x[0] } else { before[3][0] + x[0] };
         assert!((end + room / machine.joints.radius_m).abs() < 1e-12, "{end}");
         for share in [1.0, 0.9, 0.95, 0.5, 0.7, 0.0] {
-            bounds.tighten(&constants, &at(share));
+            bounds.withdraw_relaxation(&constants, &at(share));
             let now = ends(&bounds);
             let lengths = leg_lengths(&machine, &at(share));
             let x = task_coordinates(&at(share), &machine.home);
@@ -231,7 +231,7 @@ fn a_long_step_turns_as_its_angular_velocity_says() {
         let h = 0.02;
         let Acceleration { angular, linear } = motion.acceleration;
         let mut found = motion;
-        step_constant_jerk(&mut found, &angular, &linear, h);
+        step_to_acceleration(&mut found, &angular, &linear, h);
         assert_near(&found, &integrated(&motion, &Vector6::zeros(), h), [6e-8, 1e-12, 1e-9]);
     }
 }

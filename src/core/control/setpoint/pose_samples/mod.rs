@@ -3,7 +3,7 @@
 //!
 //! The motion is a cubic between past poses (Hermite's, with slopes by finite differences over the
 //! neighbours), so that pose and twist are continuous. It lags the source by a delay that [`PoseSamples`]
-//! estimates from the poses: twice their interval plus the jitter of their arrival. With this delay each
+//! estimates from the poses: twice their interval, plus the latency and the jitter of their arrival. With this delay each
 //! cubic has the poses on both sides of its ends. A short extrapolation replaces a sample that is lost or
 //! late. The correction afterwards may be a jump of a few millimetres, which the reference generator behind
 //! this module smooths and limits. This module limits nothing.
@@ -18,12 +18,12 @@ mod timing;
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::setpoint::pose_samples::timing::{Delay, SampleTiming};
+use crate::control::setpoint::pose_samples::timing::{TargetLag, SampleTiming};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Number of samples kept. With [`MIN_SPACING_S`] they cover at least 0.12 s, more than the delay, which is
-/// twice the distance of two samples plus jitter.
+/// twice the distance of two samples plus latency and jitter.
 const CAPACITY: usize = 16;
 /// Smallest distance of two samples \[s\]; closer ones are averaged. Slopes over shorter times amplify the
 /// errors of stamps and poses. At 60 Hz with a jitter of 10 ms this affects nearly no sample.
@@ -80,7 +80,7 @@ pub struct PoseSamples {
     samples: [Option<Sample>; CAPACITY],
     newest: usize,
     timing: SampleTiming,
-    delay: Delay,
+    delay: TargetLag,
 }
 
 impl PoseSamples {
@@ -103,7 +103,7 @@ impl PoseSamples {
         let is_first = self.timing.interval_count == 0.0;
         self.timing.update(interval, seconds_between(last.time_ns, now_ns));
         let delay = self.timing.interpolation_delay_s();
-        self.delay = if is_first { Delay::new(delay, now_ns) } else { self.delay.toward(delay, now_ns) };
+        self.delay = if is_first { TargetLag::new(delay, now_ns) } else { self.delay.toward(delay, now_ns) };
         self.append(time_ns, pose);
         self.update_slopes();
     }

@@ -9,7 +9,7 @@ use crate::control::signals::time::seconds_between;
 const MAX_DELAY_S: f64 = 0.15;
 /// Largest change of the delay per time. It changes the twist of the target by the same ratio.
 const MAX_DELAY_RATE: f64 = 0.1;
-/// Time in which the delay moves to its estimate \[s\]: many samples, so that noise of the estimate causes no
+/// Time in which the delay moves to its estimate, from each new sample on \[s\]: many samples, so that noise of the estimate causes no
 /// motion.
 const DELAY_TRANSITION_S: f64 = 0.5;
 /// Weight of the newest sample in the estimates of interval and jitter: an average over half a second at
@@ -60,13 +60,13 @@ impl SampleTiming {
 
 /// Delay of the target \[s\]; between two samples it changes at a constant rate.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(in crate::control::setpoint::pose_samples) struct Delay {
+pub(in crate::control::setpoint::pose_samples) struct TargetLag {
     since_ns: u64,
     value: f64,
     rate: f64,
 }
 
-impl Delay {
+impl TargetLag {
     pub fn new(value_s: f64, since_ns: u64) -> Self {
         Self { since_ns, value: value_s, rate: 0.0 }
     }
@@ -102,7 +102,7 @@ mod tests {
         for (from, to, after_ms, expected) in
             [(0.02, 0.15, 100, 0.03), (0.15, 0.02, 100, 0.14), (0.02, 0.03, 250, 0.025)]
         {
-            let delay = Delay::new(from, 5 * MS).toward(to, 7 * MS);
+            let delay = TargetLag::new(from, 5 * MS).toward(to, 7 * MS);
             assert_eq!(delay.at(7 * MS), from);
             assert!((delay.at((7 + after_ms) * MS) - expected).abs() < 1e-12, "{delay:?}");
             assert!((delay.rate_at(8 * MS) * after_ms as f64 * 1e-3 - (expected - from)).abs() < 1e-12);

@@ -21,10 +21,10 @@ const STROKE_TOLERANCE_RATIO: f64 = 0.02;
 /// the whole pause.
 const MAX_PLAUSIBILITY_WINDOW_INTERVALS: f64 = 2.0;
 
-/// The last valid input, and why a later one was rejected. `Valid` is the form in which a valid input is
+/// The last input, valid or not: the last valid one, and why a later one was rejected. `Valid` is the form in which a valid input is
 /// stored.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(in crate::control) struct LastValid<Input, Valid> {
+pub(in crate::control) struct LastInput<Input, Valid> {
     pub valid: Option<Valid>,
     /// Last input if it was rejected, with the reason of its rejection or of the first since the valid one.
     rejected: Option<(Input, Diagnostic)>,
@@ -34,13 +34,13 @@ pub(in crate::control) struct LastValid<Input, Valid> {
     longest_interval_ns: u64,
 }
 
-impl<Input, Valid> Default for LastValid<Input, Valid> {
+impl<Input, Valid> Default for LastInput<Input, Valid> {
     fn default() -> Self {
         Self { valid: None, rejected: None, validated_ns: 0, longest_interval_ns: 0 }
     }
 }
 
-impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid> {
+impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastInput<Input, Valid> {
     /// Whether an input differs from the last one, valid or rejected. Each input is validated once.
     pub fn is_new(&self, input: &Input) -> bool {
         let valid = || self.valid.as_ref().map(AsRef::as_ref);
