@@ -62,6 +62,7 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
 const UNSAFE: [&str; 3] = ["messages", "operator", "realtime"];
 
 mod import_cycles;
+mod units;
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")

@@ -275,7 +275,8 @@ mod tests {
             let home = config.machine.home;
             let lengths = leg_lengths(&config.machine, &pose_of(&home));
             let longest = lengths.iter().copied().fold(0.0, f64::max);
-            let seen = Observation { reference_or_pose: Some(home), target: Some(home), ..Observation::default() };
+            let seen =
+                Observation { reference_or_pose: Some(home), target: Some(home), ..Observation::default() };
             // The margin of the stroke is a few millimetres.
             for (room, is_longer) in [(0.1, true), (12e-3, false)] {
                 config.machine.actuator.max_length_m = longest + room;

@@ -23,7 +23,7 @@ pub fn answer(config: &Config, error: &Vector6<f64>) -> Vector6<f64> {
     let estimate = ErrorEstimate {
         value: error * by_e,
         rate: error * (by_w / period_s),
-        disturbance: (error * (by_d / (period_s * period_s))).sup(&-largest).inf(&largest),
+        disturbance_acceleration: (error * (by_d / (period_s * period_s))).sup(&-largest).inf(&largest),
     };
     let at_force = estimate.after(0.6 * period_s, &FeedbackAcceleration::default());
     parameters.law.commanded_acceleration(&at_force, &input_matrix).0

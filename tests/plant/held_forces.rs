@@ -10,7 +10,8 @@ fn no_motion_changes_an_acceleration_faster_than_the_bounds_of_the_jerk() {
     let of = |velocity| DerivativeLimits { velocity, acceleration: 1.0, jerk: 1.0 };
     let limits = Limits { position: of(0.3), orientation: of(0.5), autonomous_scale: 1.0 };
     let mut random = Random::new(7);
-    let mut displacement = |size: f64| Twist::from_vector(&Vector6::from_fn(|_, _| size * random.near_gaussian()));
+    let mut displacement =
+        |size: f64| Twist::from_vector(&Vector6::from_fn(|_, _| size * random.near_gaussian()));
     for name in MACHINES {
         let machine = machine(name);
         let plant = ForwardDynamics::new(&machine);

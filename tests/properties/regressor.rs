@@ -1,8 +1,8 @@
 //! The regressor form: exact, linear, and blind in the directions it names.
 
 use hexad::model::regressor::{
-    COULOMB, INDISTINGUISHABLE_PAIRS, DynamicParameters, DYNAMIC_PARAMETER_COUNT, REFLECTED, Regressor, VISCOUS,
-    dynamic_parameters, regressor, rod_mass_null_direction,
+    COULOMB, DYNAMIC_PARAMETER_COUNT, DynamicParameters, INDISTINGUISHABLE_PAIRS, REFLECTED, Regressor,
+    VISCOUS, dynamic_parameters, regressor, rod_mass_null_direction,
 };
 
 use super::*;

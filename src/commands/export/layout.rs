@@ -86,7 +86,7 @@ pub(super) fn quaternion(rotation: &Rotation3<f64>) -> [f64; 4] {
 /// The inertia of a link about its centre of mass, leg axes, at this length.
 pub(super) fn link_inertia(link: &Link, length: f64) -> Matrix3<f64> {
     let TransverseInertia { constant_kg_m2, quadratic_kg, reference_length_m } = link.transverse_inertia;
-    let transverse = constant_kgquadratic_kgdratic * (length - reference_length_m).powi(2);
+    let transverse = constant_kg_m2 + quadratic_kg * (length - reference_length_m).powi(2);
     realizable(&Matrix3::from_diagonal(&Vector3::new(transverse, transverse, link.axial_inertia_kg_m2)))
 }
 

@@ -138,9 +138,10 @@ fn origin(config: &Config) -> (Observation, &'static str) {
     let home = config.machine.home;
     match status(&config.name).ok().and_then(|answer| Observation::of_answer(&answer, 0, &home)) {
         Some(seen) => (seen, "where the platform is"),
-        None => {
-            (Observation { reference_or_pose: Some(home), ..Observation::default() }, "home, as no daemon answers")
-        }
+        None => (
+            Observation { reference_or_pose: Some(home), ..Observation::default() },
+            "home, as no daemon answers",
+        ),
     }
 }
 

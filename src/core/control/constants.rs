@@ -46,7 +46,7 @@ pub struct Constants {
     pub estimator: EstimatorConstants,
     /// Square of the least disturbance that may come from a force that a drive does not deliver; infinite if
     /// the law leaves forces to feedback.
-    pub least_missing_acceleration_squared: f64,
+    pub least_missing_acceleration_squared_m2_s4: f64,
     /// Changes of the disturbance that are no fault.
     pub disturbance_bounds: DisturbanceBounds,
     /// Bounds on equal readings of one leg.
@@ -95,7 +95,7 @@ impl Constants {
             disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
             acceleration_by_command,
-            least_missing_acceleration_squared,
+            least_missing_acceleration_squared_m2_s4: least_missing_acceleration_squared,
             frozen_leg: FrozenLegBounds::new(parameters.law.position.kp_per_s2, &machine.actuator, period_s),
             estimator: EstimatorConstants::new(
                 parameters.noise,

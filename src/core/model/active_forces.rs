@@ -21,7 +21,7 @@ use super::fidelity::{Fidelity, ModelTerms, with_terms};
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
 use super::lanes3::Lanes3;
-use super::leg::{JointForces, LegConstants, ForceOnLeg};
+use super::leg::{ForceOnLeg, JointForces, LegConstants};
 use super::machine::{Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
@@ -171,9 +171,9 @@ impl InverseDynamics {
     pub(super) fn joint_masses<S: Simd>(&self, simd: S, legs: &LegGeometry<S>) -> [JointForces<S>; 3] {
         let reflected = legs.direction * f64x8::splat(simd, self.machine.actuator.reflected_mass_kg);
         let [mut x, mut y, mut z] = self.legs.joint_masses(simd, &self.machine, legs);
-        x.axial += reflected.x;
-        y.axial += reflected.y;
-        z.axial += reflected.z;
+        x.axial_n += reflected.x;
+        y.axial_n += reflected.y;
+        z.axial_n += reflected.z;
         [x, y, z]
     }
 

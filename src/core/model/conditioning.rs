@@ -36,7 +36,7 @@ impl Conditioning {
             let (sensitivity, largest_row_norm) =
                 Sensitivity::with_largest_row(simd, joints, &legs, &factorization);
             Self {
-                largest_row_norm: largest_row_norm,
+                largest_row_norm,
                 sensitivity,
                 shortest_leg_m: least_of_legs(legs.length_m),
                 universal_sine: legs.universal_sine(simd, joints),

@@ -72,7 +72,7 @@ impl DriveLoads {
         // Forces at the joints for `e x b` with each axis e, then for each axis.
         let transverse =
             [mz * arm.y - my * arm.z, mx * arm.z - mz * arm.x, my * arm.x - mx * arm.y, mx, my, mz];
-        let [ax, ay, az] = [x.axial, y.axial, z.axial];
+        let [ax, ay, az] = [x.axial_n, y.axial_n, z.axial_n];
         let axial = [az * arm.y - ay * arm.z, ax * arm.z - az * arm.x, ay * arm.x - ax * arm.y, ax, ay, az];
         let mut by_acceleration = [LegLanes::default(); LEGS];
         let columns = by_acceleration.iter_mut().zip(turning).zip(transverse.into_iter().zip(axial));

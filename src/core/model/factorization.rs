@@ -268,8 +268,8 @@ pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) 
 
 /// Whether both determinants are large enough for block elimination; `radius_cubed_m3` is a field of [`Joints`].
 #[inline(always)]
-pub(super) fn are_regular_blocks(d_a: f64, d_s: f64, radius_cubed: f64) -> bool {
-    d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * radius_cubed
+pub(super) fn are_regular_blocks(d_a: f64, d_s: f64, radius_cubed_m3: f64) -> bool {
+    d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * radius_cubed_m3
 }
 
 /// Returns `v_i+1 x v_i+2` in each lane i.

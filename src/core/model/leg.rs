@@ -190,7 +190,7 @@ impl<S: Simd> ForceOnLeg<S> {
 /// Forces of the platform on each leg at its joint, in base axes: the part normal to the leg, and along it.
 pub(super) struct JointForces<S: Simd> {
     pub transverse: Lanes3<f64x8<S>>,
-    pub axial: f64x8<S>,
+    pub axial_n: f64x8<S>,
 }
 
 impl LegConstants {
@@ -217,9 +217,9 @@ impl LegConstants {
         let mut z = (k * (spin * k.z)).minus_scaled(along * n.z, n);
         (x.x, y.y, z.z) = (x.x + j, y.y + j, z.z + j);
         [
-            JointForces { transverse: x, axial: m2 * n.x },
-            JointForces { transverse: y, axial: m2 * n.y },
-            JointForces { transverse: z, axial: m2 * n.z },
+            JointForces { transverse: x, axial_n: m2 * n.x },
+            JointForces { transverse: y, axial_n: m2 * n.y },
+            JointForces { transverse: z, axial_n: m2 * n.z },
         ]
     }
 }

@@ -126,24 +126,24 @@ impl Joints {
     /// Packs six legs into lanes and derives the characteristic length. The lane order is the best one at the
     /// home pose.
     pub fn new(
-        base: &[Vector3<f64>; LEGS],
-        platform: &[Vector3<f64>; LEGS],
+        base_m: &[Vector3<f64>; LEGS],
+        platform_m: &[Vector3<f64>; LEGS],
         universal_axis: &[Vector3<f64>; LEGS],
         home: &Pose,
     ) -> Self {
-        let mut directions = *base;
-        for (direction, joint) in directions.iter_mut().zip(platform) {
+        let mut directions = *base_m;
+        for (direction, joint) in directions.iter_mut().zip(platform_m) {
             *direction = (home.position + home.rotation * joint - *direction).normalize();
         }
         let triples = Triples::best(&directions);
-        let center_m = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
-        let around_center = platform.map(|b| b - center_m);
+        let center_m = platform_m.iter().sum::<Vector3<f64>>() / LEGS as f64;
+        let around_center = platform_m.map(|b| b - center_m);
         let mean_square = around_center.iter().map(Vector3::norm_squared).sum::<f64>() / LEGS as f64;
         let radius_m = mean_square.sqrt();
         Self {
             triples,
-            base: triples.pack_vectors(base),
-            platform: triples.pack_vectors(platform),
+            base: triples.pack_vectors(base_m),
+            platform: triples.pack_vectors(platform_m),
             universal_axis: triples.pack_vectors(universal_axis),
             radius_m,
             radius_cubed_m3: radius_m * radius_m * radius_m,
@@ -172,14 +172,14 @@ impl Joints {
 
     /// The same joints, with a point of the platform (from C, in platform axes) in the first lane of padding.
     /// The leg in that lane begins far outside any platform.
-    pub(super) fn with_point(&self, point: &Vector3<f64>) -> Self {
+    pub(super) fn with_point(&self, point_m: &Vector3<f64>) -> Self {
         let mut joints = self.clone();
-        let around_center = point - self.center_m;
+        let around_center = point_m - self.center_m;
         let lanes = joints.platform.iter_mut().chain(&mut joints.around_center);
-        for (lane, value) in lanes.zip(point.iter().chain(&around_center)) {
+        for (lane, value) in lanes.zip(point_m.iter().chain(&around_center)) {
             *lane = lane.with_padding(*value);
         }
-        let far = 1e3 * (self.radius_m + point.norm());
+        let far = 1e3 * (self.radius_m + point_m.norm());
         joints.base = joints.base.map(|lane| lane.with_padding(far));
         joints
     }

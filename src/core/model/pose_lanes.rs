@@ -23,7 +23,7 @@ use super::factorization::are_regular_blocks;
 use super::fidelity::{Fidelity, LegInertia, ModelTerms, with_terms};
 use super::inverse_geometry::LegGeometry;
 use super::lanes3::Lanes3;
-use super::leg::{LegConstants, ForceOnLeg};
+use super::leg::{ForceOnLeg, LegConstants};
 use super::pose_factorization::{Column, LANES, Matrix, PoseFactorization, vectors};
 use super::rigid::Motion;
 use super::triples::{LegLanes, Triples};

@@ -150,12 +150,12 @@ pub fn rod_mass_null_direction(machine: &Machine) -> DynamicParameters {
 /// # use hexad_core::{model::{active_forces::inverse_dynamics, fidelity::Exact, regressor::*, task::TaskState}};
 /// # let machine = Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine;
 /// let motion = TaskState { xdd: [0.1, 0.0, 0.2, 1.0, 0.0, 2.0].into(), ..TaskState::at_rest(machine.home) }.motion();
-/// let forces = regressor(&machine, &motion).unwrap() * inertial_parameters(&machine);
+/// let forces = regressor(&machine, &motion).unwrap() * dynamic_parameters(&machine);
 /// let expected = inverse_dynamics::<Exact>(&machine, &motion).unwrap();
 /// assert!((forces - nalgebra::Vector6::from(expected)).amax() < 1e-9 * forces.amax());
 /// ```
 ///
-/// `Y inertial_parameters(machine)` equals the forces of [`Exact`](super::fidelity::Exact), up to rounding
+/// `Y dynamic_parameters(machine)` equals the forces of [`Exact`](super::fidelity::Exact), up to rounding
 /// times the condition of N (LU with partial pivoting, see [`super::inverse_jacobian::condition`]). The
 /// function uses only geometry, gravity, reference lengths and smoothing of `machine`.
 pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {

@@ -136,8 +136,8 @@ impl Pose {
 
 /// Rotation matrix of a rotation vector `w`: Rodrigues' formula, exact for every angle.
 #[inline(always)]
-pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
-    let x = w.norm_squared();
+pub fn exp(turn_rad: &Vector3<f64>) -> Matrix3<f64> {
+    let x = turn_rad.norm_squared();
     // Below 0.05 rad the series is exact to rounding and takes a third of the time.
     let (a, b) = if x < 2.5e-3 {
         (
@@ -150,9 +150,9 @@ pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
         (sin / angle, (1.0 - cos) / x)
     };
     // I + a w~ + b w~^2 with w~^2 = w w^T - |w|^2 I.
-    let (u, v) = (w * a, w * b);
-    let (xy, xz, yz) = (v.x * w.y, v.x * w.z, v.y * w.z);
-    let (xx, yy, zz) = (v.x * w.x, v.y * w.y, v.z * w.z);
+    let (u, v) = (turn_rad * a, turn_rad * b);
+    let (xy, xz, yz) = (v.x * turn_rad.y, v.x * turn_rad.z, v.y * turn_rad.z);
+    let (xx, yy, zz) = (v.x * turn_rad.x, v.y * turn_rad.y, v.z * turn_rad.z);
     Matrix3::new(
         1.0 - (yy + zz),
         xy - u.z,

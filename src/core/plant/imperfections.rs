@@ -192,7 +192,8 @@ impl BuildErrors {
     fn displace(&self, machine: &mut Machine, random: &mut Random) {
         let joints = &machine.joints;
         let mut displaced = |points: [Vector3<f64>; LEGS]| {
-            points.map(|point| point + Vector3::from_fn(|_, _| self.joint_deviation_m * random.near_gaussian()))
+            points
+                .map(|point| point + Vector3::from_fn(|_, _| self.joint_deviation_m * random.near_gaussian()))
         };
         let base = displaced(joints.triples.unpack_vectors(&joints.base));
         let platform = displaced(joints.triples.unpack_vectors(&joints.platform));

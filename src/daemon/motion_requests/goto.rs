@@ -120,7 +120,9 @@ fn error_to(seen: &Observation, x: &[f64; 6]) -> Option<Twist> {
 
 /// The error of a target that was not reached in time.
 fn too_late(seen: &Observation, x: &[f64; 6], window: &InPositionWindow, longest_s: f64) -> TargetError {
-    match error_to(seen, x).filter(|_| seen.reference_or_pose.is_some_and(|reference| is_reached(&reference, x))) {
+    match error_to(seen, x)
+        .filter(|_| seen.reference_or_pose.is_some_and(|reference| is_reached(&reference, x)))
+    {
         Some(error) => TargetError::NotInPosition(longest_s, Deviation(error), *window),
         None => TargetError::TimedOut(longest_s),
     }

@@ -8,7 +8,12 @@ use hexad_core::model::task::pose_of;
 use hexad_machine::analysis::target_motion::{TargetRefusal, check_target};
 
 /// Holds the platform.
-pub fn hold_where_it_rests(job: &Job, constants: &Constants, feed: JobFeed<'_>, bus: &Bus) -> Result<(), TargetError> {
+pub fn hold_where_it_rests(
+    job: &Job,
+    constants: &Constants,
+    feed: JobFeed<'_>,
+    bus: &Bus,
+) -> Result<(), TargetError> {
     let mut source = job.source(feed, bus, job.order.may_engage)?;
     let x = job.start_x(&mut source, constants)?;
     check_target(constants, &pose_of(&x)).map_err(TargetRefusal::Target)?;

@@ -19,7 +19,7 @@ use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::random::Random;
 use hexad_core::model::regressor::{
-    INDISTINGUISHABLE_PAIRS, DynamicParameters, dynamic_parameters, regressor, rod_mass_null_direction,
+    DynamicParameters, INDISTINGUISHABLE_PAIRS, dynamic_parameters, regressor, rod_mass_null_direction,
 };
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::built_in::keeps_reserve;

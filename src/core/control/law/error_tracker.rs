@@ -96,7 +96,7 @@ impl ErrorTracker {
                 [leg_lengths(constants.machine(), &desired.pose), feedback]
             };
             let EstimatorConstants { reading_errors, .. } = &constants.estimator;
-            let disturbance_now = &estimator.at_measurement().disturbance;
+            let disturbance_now = &estimator.at_measurement().disturbance_acceleration;
             let mut check = || {
                 sensors.check(&located.measurement.length_m, reading_errors, &constants.frozen_leg, legs)?;
                 check_innovation(constants, &innovation, interval_s, located)?;

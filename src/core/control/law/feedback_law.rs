@@ -136,7 +136,7 @@ impl Law {
         if !self.compensates_disturbance {
             return CommandedAcceleration(feedback);
         }
-        CommandedAcceleration(feedback + input_matrix.command(&estimate.disturbance))
+        CommandedAcceleration(feedback + input_matrix.command(&estimate.disturbance_acceleration))
     }
 
     /// Largest ratio of the compensated disturbance to its bound.
@@ -144,7 +144,7 @@ impl Law {
         if !self.compensates_disturbance {
             return 0.0;
         }
-        estimate.disturbance.component_div(&self.max_compensated_acceleration).amax()
+        estimate.disturbance_acceleration.component_div(&self.max_compensated_acceleration).amax()
     }
 
     /// Motion whose forces the mode commands. Computed torque: the predicted pose (reference minus predicted

@@ -63,8 +63,8 @@ impl InputMatrix {
     }
 
     /// Largest disturbance of each axis that a law with this acceleration bound can compensate.
-    pub fn largest_compensable_disturbance(&self, bound: &Vector6<f64>) -> Vector6<f64> {
-        self.matrix_and_inverse.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
+    pub fn largest_compensable_disturbance(&self, max_acceleration: &Vector6<f64>) -> Vector6<f64> {
+        self.matrix_and_inverse.map_or(*max_acceleration, |[matrix, _]| matrix.abs() * max_acceleration)
     }
 
     /// Acceleration by an additional wrench at a pose: the forces that limits removed.

@@ -227,8 +227,13 @@ impl DisturbanceMonitor {
         self.since_start_s += dt_s;
         self.removed_acceleration *= 1.0 - (dt_s / CUT_FORCE_DECAY_TIME_CONSTANT_S).min(1.0);
         let by_friction = friction.payload_changes(&bounds.friction);
-        let payload =
-            self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, by_friction, dt_s);
+        let payload = self.check_payload(
+            bounds,
+            &estimate.disturbance_acceleration,
+            &reference.acceleration,
+            by_friction,
+            dt_s,
+        );
         let impact = self.check_impact(bounds, sudden, friction, dt_s);
         let by_friction = bounds.swing_by_friction * friction.swing_acceleration(&bounds.friction);
         let reference = reference.acceleration.vector();

@@ -72,7 +72,7 @@ impl DriveResponse {
         let arm = constants.angle_weighting_radius_m();
         self.sudden_acceleration = if is_starting { Vector6::zeros() } else { sudden };
         let sudden = weighted(&sudden, arm);
-        if is_starting || sudden.norm_squared() < constants.least_missing_acceleration_squared {
+        if is_starting || sudden.norm_squared() < constants.least_missing_acceleration_squared_m2_s4 {
             self.missing_s = 0.0;
             return Ok(());
         }

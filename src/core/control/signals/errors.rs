@@ -86,13 +86,13 @@ pub struct ErrorEstimate {
     /// w, its rate.
     pub rate: Vector6<f64>,
     /// d, the acceleration that the model does not contain.
-    pub disturbance: Vector6<f64>,
+    pub disturbance_acceleration: Vector6<f64>,
 }
 
 impl ErrorEstimate {
     /// Advances the estimate by `dt_s` seconds, in which feedback accelerates the platform by u.
     pub fn advance(&mut self, dt_s: f64, FeedbackAcceleration(u): &FeedbackAcceleration) {
-        let acceleration = self.disturbance - u;
+        let acceleration = self.disturbance_acceleration - u;
         self.value += (self.rate + acceleration * (0.5 * dt_s)) * dt_s;
         self.rate += acceleration * dt_s;
     }

@@ -12,7 +12,7 @@ struct Scene {
     kind: SetpointKind,
     error: Option<PoseError>,
     feedback: FeedbackLimiter,
-    measurement_diagnostic: Option<Diagnostic>,
+    sensor_or_drive_fault: Option<Diagnostic>,
     disturbance_diagnostic: Option<Diagnostic>,
     reports: [Result<(), Diagnostic>; 2],
     is_ready: bool,
@@ -28,7 +28,7 @@ impl Default for Scene {
             kind: SetpointKind::Motion,
             error: Some(PoseError::default()),
             feedback: FeedbackLimiter::default(),
-            measurement_diagnostic: None,
+            sensor_or_drive_fault: None,
             disturbance_diagnostic: None,
             reports: [Ok(()); 2],
             is_ready: true,
@@ -71,7 +71,7 @@ impl Scene {
             localization: located.map(drop),
             error: self.error.as_ref(),
             feedback: &self.feedback,
-            sensor_or_drive_fault: self.measurement_diagnostic.as_ref(),
+            sensor_or_drive_fault: self.sensor_or_drive_fault.as_ref(),
             disturbance_diagnostic: self.disturbance_diagnostic.as_ref(),
             drive_and_pose_checks: &self.reports,
             is_ready: self.is_ready,
@@ -111,7 +111,7 @@ fn each_finding_alone_ends_the_tracking() {
         for reports in [[Err(FOUND), Ok(())], [Ok(()), Err(FOUND)]] {
             assert_eq!(Scene { reports, ..Scene::default() }.tracking(state), found);
         }
-        assert_eq!(Scene { measurement_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { sensor_or_drive_fault: Some(FOUND), ..Scene::default() }.tracking(state), found);
         assert_eq!(Scene { disturbance_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
         // A stop for a disturbance hides no reason to brake.
         let impact = Some(DiagnosticCode::Impact.into());
@@ -150,7 +150,7 @@ fn each_finding_alone_ends_the_tracking() {
         assert_eq!(Scene { feedback, ..Scene::default() }.tracking(state), saturated);
     }
     // Without control nothing is tracked.
-    let found = Scene { measurement_diagnostic: Some(FOUND), ..Scene::default() };
+    let found = Scene { sensor_or_drive_fault: Some(FOUND), ..Scene::default() };
     assert_eq!(found.tracking(State::Standby), None);
 }
 

@@ -44,7 +44,7 @@ impl ErrorEstimate {
     ) {
         self.value += innovation * by_e;
         self.rate += innovation * (by_w * rate_hz);
-        self.disturbance += innovation * (by_d * rate_hz * rate_hz);
+        self.disturbance_acceleration += innovation * (by_d * rate_hz * rate_hz);
     }
 }
 
@@ -60,7 +60,7 @@ pub(in crate::control) struct KalmanFilter {
 impl KalmanFilter {
     pub fn new(constants: &EstimatorConstants, time_ns: u64, error: &ErrorCoordinates) -> Self {
         let ErrorCoordinates { value, rate } = *error;
-        let state = ErrorEstimate { value, rate, disturbance: Vector6::zeros() };
+        let state = ErrorEstimate { value, rate, disturbance_acceleration: Vector6::zeros() };
         Self { state, time_ns, covariance: constants.covariance }
     }
 
@@ -81,8 +81,10 @@ impl KalmanFilter {
             let difference = (measured.rate - state.rate) * noise.period_s;
             state.correct(covariance.correct_rate(variance), rate_hz, &difference);
         }
-        state.disturbance =
-            state.disturbance.sup(&-max_compensated_acceleration).inf(max_compensated_acceleration);
+        state.disturbance_acceleration = state
+            .disturbance_acceleration
+            .sup(&-max_compensated_acceleration)
+            .inf(max_compensated_acceleration);
         self.time_ns = time_ns;
         innovation
     }

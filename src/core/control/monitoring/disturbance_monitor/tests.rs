@@ -59,7 +59,11 @@ fn checked(
 }
 
 fn with(error: f64, disturbance: f64) -> ErrorEstimate {
-    ErrorEstimate { value: along_z(error), rate: Vector6::zeros(), disturbance: along_z(disturbance) }
+    ErrorEstimate {
+        value: along_z(error),
+        rate: Vector6::zeros(),
+        disturbance_acceleration: along_z(disturbance),
+    }
 }
 
 #[test]

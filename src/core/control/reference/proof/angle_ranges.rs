@@ -39,7 +39,7 @@ pub(in crate::control::reference) struct AngleRanges {
     sine: [f64; LANES],
     cosine: [f64; LANES],
     /// Largest margin that is required from each end \[rad\].
-    max_margin: [f64; LANES],
+    margin_cap_m: [f64; LANES],
     /// For a wide range, the sign of the distance, and the largest cosine of a distance that is always
     /// enough. For a narrow range, 0 and minus infinity.
     wide_sign: [f64; LANES],
@@ -58,7 +58,7 @@ impl AngleRanges {
         let mut ranges = Self {
             sine: zeros,
             cosine: zeros,
-            max_margin: zeros,
+            margin_cap_m: zeros,
             wide_sign: zeros,
             far_cosine: [f64::NEG_INFINITY; LANES],
             cos_beta_sign: 1.0_f64.copysign(libm::cos(beta)),
@@ -95,7 +95,7 @@ impl AngleRanges {
         let lanes = [
             &mut self.sine,
             &mut self.cosine,
-            &mut self.max_margin,
+            &mut self.margin_cap_m,
             &mut self.wide_sign,
             &mut self.far_cosine,
         ];
@@ -107,7 +107,7 @@ impl AngleRanges {
     }
 
     /// Whether each angle of a rotation keeps a margin \[rad\] from the ends of its range. The margin is at
-    /// most [`MAX_MARGIN_RATIO`] of the width.
+    /// most [`MARGIN_CAP_RATIO`] of the width.
     #[inline(always)]
     pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, margin_rad: f64) -> bool {
         let c = cosine_of_beta(r);
@@ -123,7 +123,7 @@ impl AngleRanges {
         let (end_sine, end_cosine) = (load(&self.sine), load(&self.cosine));
         let distance_sine = sine * end_cosine - cosine * end_sine;
         let distance_cosine = (cosine * end_cosine + sine * end_sine) * load(&self.wide_sign);
-        let margin = load(&self.max_margin).min(f64x8::splat(simd, margin_rad)) * both([c, 1.0, c, 0.0]);
+        let margin = load(&self.margin_cap_m).min(f64x8::splat(simd, margin_rad)) * both([c, 1.0, c, 0.0]);
         let is_kept = distance_sine.simd_ge(margin) | distance_cosine.simd_le(load(&self.far_cosine));
         is_kept.all_true() & self.is_nonempty
     }

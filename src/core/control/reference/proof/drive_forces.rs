@@ -122,8 +122,8 @@ pub(in crate::control::reference) struct BallLoads {
 }
 
 impl BallLoads {
-    pub fn new(center: &Pose, inverse_norm: f64, largest_row: f64) -> Self {
-        Self { inverse_norm, largest_row, at_center: None, center: Some(*center) }
+    pub fn new(center: &Pose, inverse_norm: f64, largest_row_norm: f64) -> Self {
+        Self { inverse_norm, largest_row: largest_row_norm, at_center: None, center: Some(*center) }
     }
 
     /// Computes the loads at the centre, if it is regular.

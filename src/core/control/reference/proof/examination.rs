@@ -32,7 +32,9 @@ use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{REGULARITY_EFFORT, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
-use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_RATIO, VELOCITY_ROUNDING_RATIO};
+use crate::control::reference::proof::tolerances::{
+    ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_RATIO, VELOCITY_ROUNDING_RATIO,
+};
 use crate::control::reference::stop::pose_stop::{
     PoseStop, PoseStopState, advanced_without_orthonormalizing,
 };

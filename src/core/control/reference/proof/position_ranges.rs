@@ -21,16 +21,21 @@ impl PositionEnvelope {
     /// Ranges of an envelope.
     pub fn new(Envelope { lowest: [.., x0, y0, z0], highest: [.., x1, y1, z1] }: &Envelope) -> Self {
         let (low, high) = (Vector3::new(*x0, *y0, *z0), Vector3::new(*x1, *y1, *z1));
-        let max_margin = (high - low) * MARGIN_CAP_RATIO;
-        Self { lowest: padded(&low), highest: padded(&high), margin_cap_m: padded(&max_margin) }
+        let margin_cap_m = (high - low) * MARGIN_CAP_RATIO;
+        Self { lowest: padded(&low), highest: padded(&high), margin_cap_m: padded(&margin_cap_m) }
     }
 
     /// Whether each coordinate of both positions keeps a margin from the ends of its range. The margin is at
-    /// most [`MAX_MARGIN_RATIO`] of the width.
+    /// most [`MARGIN_CAP_RATIO`] of the width.
     #[inline(always)]
-    pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], margin_m: &Vector3<f64>) -> bool {
+    pub fn contain<S: Simd>(
+        &self,
+        simd: S,
+        positions_m: [&Vector3<f64>; 2],
+        margin_m: &Vector3<f64>,
+    ) -> bool {
         let load = |lanes: Padded| f64x4::load_array(simd, lanes);
-        let [first, second] = positions.map(|position| load(padded(position)));
+        let [first, second] = positions_m.map(|position| load(padded(position)));
         let room = (first.min(second) - load(self.lowest)).min(load(self.highest) - first.max(second));
         room.simd_ge(load(padded(margin_m)).min(load(self.margin_cap_m))).all_true()
     }

@@ -18,7 +18,7 @@ mod timing;
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::setpoint::pose_samples::timing::{TargetLag, SampleTiming};
+use crate::control::setpoint::pose_samples::timing::{SampleTiming, TargetLag};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
