@@ -37,8 +37,8 @@ use super::triples::LegLanes;
 /// let forces = model.forces::<Exact>(&rest).unwrap();
 /// // At rest the legs carry at least the platform, and the rest of the weight stands on the base joints.
 /// let wrench = leg_wrenches(&machine, &rest.pose) * nalgebra::Vector6::from(forces);
-/// let lifted = -wrench.fixed_rows::<3>(3).dot(&machine.gravity.normalize());
-/// assert!(lifted > machine.platform.mass * machine.gravity.norm());
+/// let lifted = -wrench.fixed_rows::<3>(3).dot(&machine.gravity_m_s2.normalize());
+/// assert!(lifted > machine.platform.mass_kg * machine.gravity_m_s2.norm());
 /// ```
 #[derive(Clone, Debug)]
 pub struct InverseDynamics {

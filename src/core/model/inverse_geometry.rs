@@ -139,7 +139,7 @@ pub struct LegMotion {
 /// let state = TaskState { xd: [0.1, 0.2, 0.0, 0.0, 0.3, 0.1].into(), ..TaskState::at_rest(machine.home) };
 /// // A rate is the derivative of the length.
 /// let [before, after] = [-1e-6, 1e-6].map(|dt| leg_lengths(&machine, &state.after(dt).motion().pose)[0]);
-/// assert!(((after - before) / 2e-6 - leg_motion(&machine, &state.motion()).rate[0]).abs() < 1e-8);
+/// assert!(((after - before) / 2e-6 - leg_motion(&machine, &state.motion()).rate_m_s[0]).abs() < 1e-8);
 /// ```
 pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
     let unpack = |lane: LegLanes| machine.joints.triples.unpack(&lane);

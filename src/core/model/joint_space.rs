@@ -41,8 +41,8 @@ use super::rigid::Motion;
 /// let home = TaskState::at_rest(machine.home).motion();
 /// let legs = joint_space(&machine, &home, &inverse_dynamics::<Exact>(&machine, &home).unwrap());
 /// // At rest the legs carry the platform.
-/// let carried: nalgebra::Vector3<f64> = legs.iter().map(|leg| leg.contact_force).sum();
-/// assert!((carried + machine.gravity * machine.platform.mass).norm() < 1e-12);
+/// let carried: nalgebra::Vector3<f64> = legs.iter().map(|leg| leg.contact_force_n).sum();
+/// assert!((carried + machine.gravity_m_s2 * machine.platform.mass_kg).norm() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LegDynamics {

@@ -296,9 +296,9 @@ impl Actuator {
     ///
     /// ```
     /// # let actuator = hexad_machine::config::Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine.actuator;
-    /// let middle = 0.5 * (actuator.min_length + actuator.max_length);
+    /// let middle = 0.5 * (actuator.min_length_m + actuator.max_length_m);
     /// assert!((actuator.margin(middle) - 0.5 * actuator.stroke()).abs() < 1e-15);
-    /// assert!(actuator.margin(actuator.max_length + 0.01) < 0.0);
+    /// assert!(actuator.margin(actuator.max_length_m + 0.01) < 0.0);
     /// ```
     pub fn margin(&self, length_m: f64) -> f64 {
         (length_m - self.min_length_m).min(self.max_length_m - length_m)

@@ -34,7 +34,7 @@ use super::rigid::{Acceleration, Motion, Pose, Twist};
 /// let mass = hexad_core::model::mass_matrix::MassMatrix::new(&machine).at(&machine.home_pose());
 /// // Kinetic energy is positive and symmetric, and the legs add to the mass of the platform.
 /// assert!((mass - mass.transpose()).amax() < 1e-12 * mass.amax() && mass.cholesky().is_some());
-/// assert!(mass[(5, 5)] > machine.platform.mass);
+/// assert!(mass[(5, 5)] > machine.platform.mass_kg);
 /// ```
 #[derive(Clone, Debug)]
 pub struct MassMatrix {

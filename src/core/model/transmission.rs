@@ -22,7 +22,7 @@ use super::rigid::Motion;
 /// ```
 /// use hexad_core::model::transmission::Transmission;
 /// # let mut actuator = hexad_machine::config::Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine.actuator;
-/// (actuator.force_scale, actuator.load_friction) = ([0.9; 6], [0.1; 6]);
+/// (actuator.force_scale, actuator.load_friction_share) = ([0.9; 6], [0.1; 6]);
 /// // Of 100 N that the drive of leg 1 is told to push with, its leg gets 81 N as it extends, 99 N as it retracts.
 /// let transmission = Transmission::new(&actuator, &[0.2, -0.2, 0.0, 0.0, 0.0, 0.0]);
 /// let [extends, retracts, stands, ..] = transmission.leg_forces(&[100.0; 6]);

@@ -19,10 +19,10 @@ const PEAK_JERK: f64 = 60.0;
 /// Shortest duration \[s\] of a minimum-jerk move of length `distance` within limits of velocity, acceleration and jerk.
 ///
 /// ```
-/// use hexad_core::motion::minimum_jerk::{PEAK_RATE, shortest_duration};
+/// use hexad_core::motion::minimum_jerk::{PEAK_RATE_RATIO, shortest_duration};
 /// // 0.3 m at 0.1 m/s at most, other limits far: 1.875 times as long as at constant velocity.
 /// let duration = shortest_duration(0.3, [0.1, 1e9, 1e9]);
-/// assert!((duration - PEAK_RATE * 0.3 / 0.1).abs() < 1e-12);
+/// assert!((duration - PEAK_RATE_RATIO * 0.3 / 0.1).abs() < 1e-12);
 /// ```
 pub fn shortest_duration(distance: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
     let by_rate = PEAK_RATE_RATIO * distance / velocity;
@@ -45,9 +45,9 @@ pub struct Profile {
 /// ```
 /// use hexad_core::motion::minimum_jerk::{Profile, rise};
 /// assert_eq!(rise(0.0, 2.0), Profile::default());
-/// assert_eq!(rise(2.0, 2.0), Profile { value: 1.0, ..Profile::default() });
+/// assert_eq!(rise(2.0, 2.0), Profile { value_share: 1.0, ..Profile::default() });
 /// // Symmetric: halfway at half the time, fastest there, and no acceleration.
-/// assert_eq!(rise(1.0, 2.0), Profile { value: 0.5, rate: 1.875 / 2.0, accel: 0.0 });
+/// assert_eq!(rise(1.0, 2.0), Profile { value_share: 0.5, rate_per_s: 1.875 / 2.0, accel_per_s2: 0.0 });
 /// ```
 pub fn rise(t_s: f64, duration_s: f64) -> Profile {
     let u = t_s / duration_s;

@@ -20,7 +20,7 @@ pub struct Knot {
 ///
 /// ```
 /// use hexad_core::{model::task::TaskState, motion::trajectory::{Knot, interpolate}};
-/// let knot = |t, z| Knot { t, state: TaskState::at_rest([0.0, 0.0, 0.0, 0.0, 0.0, z]) };
+/// let knot = |t_s, z| Knot { t_s, state: TaskState::at_rest([0.0, 0.0, 0.0, 0.0, 0.0, z]) };
 /// let knots = [knot(0.0, 1.0), knot(2.0, 1.2)];
 /// // From rest to rest: the minimum-jerk move, halfway at half the time.
 /// let middle = interpolate(&knots, 1.0).unwrap();

@@ -53,12 +53,12 @@ pub struct AccelerationDemand {
 /// ```
 /// use hexad_machine::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
 /// # let machine = hexad_machine::config::Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine;
-/// let [still, agile] = [0.0, 2.0].map(|linear| {
-///     PoseEvaluator::new(&machine, AccelerationDemand { linear, angular: 0.0 }).quality(&machine.home_pose())
+/// let [still, agile] = [0.0, 2.0].map(|linear_m_s2| {
+///     PoseEvaluator::new(&machine, AccelerationDemand { linear_m_s2, angular_rad_s2: 0.0 }).quality(&machine.home_pose())
 /// });
 /// assert!(still.within_reach() && still.condition > 1.0);
 /// // Acceleration takes force that is then missing for payload.
-/// assert!(agile.worst_force > still.worst_force && agile.payload < still.payload);
+/// assert!(agile.worst_force_n > still.worst_force_n && agile.payload_kg < still.payload_kg);
 /// ```
 #[derive(Clone, Debug)]
 pub struct PoseEvaluator {
