@@ -40,7 +40,7 @@ const GAIN_STEPS: i32 = 60;
 ///
 /// ```
 /// use hexad_machine::analysis::sampled_loop::SampledLoop;
-/// let loop_of = |delay| SampledLoop { wn_t: 0.06, delay, ..SampledLoop::default() };
+/// let loop_of = |delay_periods| SampledLoop { wn_t: 0.06, delay_periods, ..SampledLoop::default() };
 /// assert!(loop_of(1.0).gain_margin() > 2.0 && loop_of(1.0).longest_delay() > 6.0);
 /// assert!(loop_of(2.0).largest_wn_t() < loop_of(1.0).largest_wn_t());
 /// ```
