@@ -152,7 +152,7 @@ impl CommandLine {
         use CommandArguments as Is;
         match self.command {
             Is::Run(arguments) => arguments.execute(),
-            Is::Plant(machine) => plant::run(&machine.load()?, &Stop::on_signals()?),
+            Is::Plant(machine) => plant::run_on_bus(&machine.load()?, &Stop::on_signals()?),
             Is::Move(arguments) => arguments.execute(),
             Is::Excite(arguments) => arguments.execute(),
             Is::Goto(arguments) => arguments.execute(),

@@ -19,7 +19,7 @@ use super::recorder::Recorded;
 use super::reload::Loaded;
 use super::reload::handover::{Answer, Offer};
 use super::report::{Fault, TrackingSum};
-use super::statistics::Collector;
+use super::statistics::CycleStatistics;
 use hexad_client::messages::StatisticsMessage;
 use hexad_client::realtime::triple_buffer::Writer;
 use hexad_client::realtime::usage::ThreadUsage;
@@ -93,7 +93,7 @@ pub fn run(mut links: LogLinks<'_, '_>, stop: &AtomicBool) -> LogReport {
 /// State of the log thread.
 #[derive(Default)]
 struct Log<'o> {
-    collector: Collector,
+    collector: CycleStatistics,
     report: LogReport,
     /// State and diagnostic of the last cycle.
     state: (State, DiagnosticCode),

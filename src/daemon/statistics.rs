@@ -33,7 +33,7 @@ impl Span {
 
 /// Timing statistics of the cycles.
 #[derive(Debug, Default)]
-pub struct Collector {
+pub struct CycleStatistics {
     window: Span,
     total: Span,
     worst: [WorstCycle; WORST_CYCLES],
@@ -42,7 +42,7 @@ pub struct Collector {
     last: u64,
 }
 
-impl Collector {
+impl CycleStatistics {
     /// Adds a cycle.
     pub fn add(&mut self, record: &CycleRecord) {
         for span in [&mut self.window, &mut self.total] {
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn the_worst_cycles_carry_the_hints_of_their_own_time() {
-        let mut collector = Collector::default();
+        let mut collector = CycleStatistics::default();
         (1..=20).for_each(|cycle| collector.add(&record(cycle, 100 + cycle)));
         collector.add_hints(&Hints { steal_ms: 20, ..Hints::default() });
         collector.add(&record(21, 5000));
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_window_ends_and_the_total_goes_on() {
-        let mut collector = Collector::default();
+        let mut collector = CycleStatistics::default();
         collector.add(&record(1, 10));
         collector.add_delay(33);
         let first = collector.end_window();

@@ -30,7 +30,7 @@ fn a_replay_of_another_version_names_both_versions_and_the_first_difference() {
         denormals::flush();
         for cycle in &mut cycles {
             let input = cycle.input().unwrap();
-            *cycle = CycleMessage::new(&input, &controller.step(&input)).timed_as(cycle);
+            *cycle = CycleMessage::new(&input, &controller.step(&input)).with_number_and_timing_of(cycle);
         }
     };
     thread::scope(|scope| scope.spawn(compute).join().unwrap());

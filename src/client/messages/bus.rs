@@ -15,9 +15,9 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
-use super::lease::PUBLISHERS;
+use super::lease::MAX_PUBLISHERS;
 use super::location::{Location, SEGMENTS_DELETED};
-use super::reservation::refusal;
+use super::reservation::take_refusal;
 use super::{LeasedSubscriber, Message, Publisher, Subscriber};
 
 /// Largest number of subscribers: daemon, plant, recorder, monitors.
@@ -25,7 +25,7 @@ const MAX_SUBSCRIBERS: usize = 16;
 const MAX_NODES: usize = 32;
 /// Number of messages by which a slow subscriber (a recorder) may lag: 256 are 12.8 ms at 20 kHz, 0.25 s at 1
 /// kHz.
-pub(super) const BUFFER: usize = 256;
+pub(super) const BUFFERED_MESSAGES: usize = 256;
 
 /// Failure of a call to iceoryx2: the attempt, and the error of iceoryx2.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +42,7 @@ impl PortError {
 }
 
 pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
-    move |cause| PortError { what, cause: refusal().unwrap_or_else(|| with_cure(&format!("{cause:?}"))) }
+    move |cause| PortError { what, cause: take_refusal().unwrap_or_else(|| with_cure(&format!("{cause:?}"))) }
 }
 
 /// Errors of iceoryx2 that give no remedy, each with its remedy.
@@ -131,7 +131,7 @@ impl Bus {
             builder.config(&location.config).create::<ipc::Service>()
         };
         let node = when_settled(patience, create).map_err(|cause| {
-            let known = refusal().or_else(|| location.obstacle());
+            let known = take_refusal().or_else(|| location.probe_writing());
             let cause = known.unwrap_or_else(|| format!("{cause:?}"));
             PortError::new("cannot create a node".into(), cause)
         })?;
@@ -153,7 +153,7 @@ impl Bus {
     /// A subscriber to `T` that keeps up to `depth` messages.
     pub fn subscriber<T: Message>(&self, depth: usize) -> Result<Subscriber<T>, PortError> {
         let service = self.service::<T>()?;
-        let port = service.subscriber_builder().buffer_size(depth.min(BUFFER)).create();
+        let port = service.subscriber_builder().buffer_size(depth.min(BUFFERED_MESSAGES)).create();
         let port = port.map_err(port_error(format!("cannot subscribe to {}", T::TOPIC)))?;
         Ok(Subscriber::new(service, port, self.is_simulated))
     }
@@ -163,10 +163,10 @@ impl Bus {
     pub fn leased_subscriber<T: Message>(
         &self,
         depth: usize,
-        timeout_ns: u64,
+        silence_timeout_ns: u64,
     ) -> Result<LeasedSubscriber<T>, PortError> {
         // In simulated time a pause is no silence.
-        let timeout_ns = if self.is_simulated { u64::MAX } else { timeout_ns };
+        let timeout_ns = if self.is_simulated { u64::MAX } else { silence_timeout_ns };
         Ok(LeasedSubscriber::new(self.subscriber(depth)?, timeout_ns))
     }
 
@@ -181,8 +181,8 @@ impl Bus {
         let service_name = name.as_str().try_into().map_err(port_error(format!("bad topic {name}")))?;
         let open = || {
             let builder = self.node.service_builder(&service_name).publish_subscribe::<T>();
-            let builder = builder.max_publishers(PUBLISHERS).max_subscribers(MAX_SUBSCRIBERS);
-            let builder = builder.max_nodes(MAX_NODES).subscriber_max_buffer_size(BUFFER);
+            let builder = builder.max_publishers(MAX_PUBLISHERS).max_subscribers(MAX_SUBSCRIBERS);
+            let builder = builder.max_nodes(MAX_NODES).subscriber_max_buffer_size(BUFFERED_MESSAGES);
             builder.enable_safe_overflow(true).history_size(0).open_or_create()
         };
         when_settled(self.patience, open).map_err(port_error(format!("cannot open topic {name}")))
@@ -213,7 +213,7 @@ mod tests {
     use std::{fs, thread};
 
     use super::super::ForceMessage;
-    use super::super::location::{BOOKS, user_folder};
+    use super::super::location::{ICEORYX_FOLDER, user_folder};
     use super::{Bus, with_cure};
 
     /// As a participant that waits for its disk leaves a topic: its description is not yet readable.
@@ -223,7 +223,7 @@ mod tests {
         let first = Bus::join(&name).unwrap();
         let _port = first.publisher::<ForceMessage>().unwrap();
         let is_of_topic = |path: &PathBuf| fs::read_to_string(path).is_ok_and(|text| text.contains(&name));
-        let services = fs::read_dir(user_folder().join(BOOKS).join("services")).unwrap();
+        let services = fs::read_dir(user_folder().join(ICEORYX_FOLDER).join("services")).unwrap();
         let description = services.flatten().map(|entry| entry.path()).find(is_of_topic).unwrap();
         let permit = |mode| fs::set_permissions(&description, fs::Permissions::from_mode(mode)).unwrap();
         permit(0o200);

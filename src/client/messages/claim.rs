@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::bus::{PortError, port_error};
 use super::location::{
     PRIVATE_FILE, SYSTEM_FOLDER, daemon_folders, entries, open_private, open_user_folder, renew_prefix,
-    system_user, user_folders, user_id,
+    service_user_id, user_folders, user_id,
 };
 
 /// End of the name of a record.
@@ -45,7 +45,7 @@ pub struct RunningDaemon {
     /// Process ID.
     pub process_id: u32,
     /// Start of the process, in clock ticks since boot.
-    pub start_time: u64,
+    pub start_ticks: u64,
     /// User of the process.
     pub user_id: u32,
     /// Its control socket.
@@ -60,7 +60,7 @@ impl Claim {
     /// machine for good.
     pub fn take(machine: &str) -> Result<Self, PortError> {
         open_user_folder()?;
-        let (mut folders, system_user) = (user_folders(), system_user());
+        let (mut folders, system_user) = (user_folders(), service_user_id());
         let system = PathBuf::from(SYSTEM_FOLDER);
         if user_id() == 0 && !folders.contains(&system) && system_user.is_some() {
             folders.push(system);
@@ -81,13 +81,13 @@ impl Claim {
     pub fn record(&mut self, socket: &Path, processors: &[usize]) -> Result<(), PortError> {
         let path = record_path(socket);
         let process_id = std::process::id();
-        let written = start_time(process_id)
+        let written = start_ticks_since_boot(process_id)
             .and_then(|start_time| write_record(&path, &record_text(process_id, start_time, processors)));
         written.map_err(port_error(format!("cannot write {}", path.display())))?;
         self.record = Some(path);
         // After its own record is written, so that of two daemons that start together at least one finds the
         // other.
-        let users = [Some(user_id()), Some(0), system_user()];
+        let users = [Some(user_id()), Some(0), service_user_id()];
         let others = all_running_daemons().into_iter().filter(|other| other.process_id != process_id);
         let shared = others.filter(|other| users.contains(&Some(other.user_id))).find_map(|other| {
             let processor = processors.iter().find(|it| other.processors.contains(it))?;
@@ -211,17 +211,17 @@ pub fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let list = lines.next().unwrap_or_default();
     let processors = list.split(',').filter_map(|number| number.parse().ok()).collect();
     let socket = path.with_extension("sock");
-    let is_alive = start_time(process_id).is_ok_and(|started| started == recorded_start);
+    let is_alive = start_ticks_since_boot(process_id).is_ok_and(|started| started == recorded_start);
     let is_of_one_user = process_user(process_id)? == owner && [folder_owner, 0].contains(&owner);
     let machine = machine.to_owned();
     let found =
-        RunningDaemon { machine, process_id, start_time: recorded_start, user_id: owner, socket, processors };
+        RunningDaemon { machine, process_id, start_ticks: recorded_start, user_id: owner, socket, processors };
     (is_alive && is_of_one_user).then_some(found)
 }
 
 /// Start of a process in clock ticks since boot. Together with the process ID it identifies the process for
 /// good.
-pub fn start_time(process_id: u32) -> io::Result<u64> {
+pub fn start_ticks_since_boot(process_id: u32) -> io::Result<u64> {
     let text = fs::read_to_string(format!("/proc/{process_id}/stat"))?;
     // The name may contain any character, even spaces and parentheses.
     let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields);
@@ -253,7 +253,7 @@ mod tests {
         let expected = RunningDaemon {
             machine: machine.clone(),
             process_id,
-            start_time: start_time(process_id).unwrap(),
+            start_ticks: start_ticks_since_boot(process_id).unwrap(),
             user_id,
             socket: socket.clone(),
             processors,
@@ -276,7 +276,7 @@ mod tests {
         let folder = open_user_folder().unwrap();
         let path = folder.join(format!("{machine}.daemon"));
         let process_id = std::process::id();
-        let started = start_time(process_id).unwrap();
+        let started = start_ticks_since_boot(process_id).unwrap();
         for (start, is_found) in [(started, true), (started + 1, false)] {
             write_record(&path, &record_text(process_id, start, &[])).unwrap();
             assert_eq!(running_daemons(&machine).len(), usize::from(is_found), "{start}");
@@ -290,7 +290,7 @@ mod tests {
         let path = folder.path().join("foreign.daemon");
         // Another user's process, or for root another user's record.
         let process_id = if user_id() == 0 { std::process::id() } else { 1 };
-        let record = record_text(process_id, start_time(process_id).unwrap(), &[]);
+        let record = record_text(process_id, start_ticks_since_boot(process_id).unwrap(), &[]);
         write_record(&path, &record).unwrap();
         if user_id() == 0 {
             assert!(running_daemon(folder.path(), "foreign").is_some(), "before it is another user's");

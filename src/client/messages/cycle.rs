@@ -218,7 +218,7 @@ impl CycleMessage {
     }
 
     /// It with the number and the timing of another.
-    pub fn timed_as(self, other: &Self) -> Self {
+    pub fn with_number_and_timing_of(self, other: &Self) -> Self {
         let Self { cycle, due_ns, wakeup_ns, compute_ns, io_late, .. } = *other;
         Self { cycle, due_ns, wakeup_ns, compute_ns, io_late, ..self }
     }

@@ -53,11 +53,11 @@ impl ForceMessage {
     /// stopped finds messages of the time before \[ns\]. In simulated time now is that of the measurement.
     pub fn may_be_applied(&self, now_ns: u64, longest_age_ns: u64) -> bool {
         let age_ns = now_ns.checked_sub(self.header.time_ns);
-        age_ns.is_some_and(|age_ns| age_ns <= longest_age_ns) && self.is_applicable()
+        age_ns.is_some_and(|age_ns| age_ns <= longest_age_ns) && self.has_valid_content()
     }
 
     /// Whether the content may be applied at any time: schema, checksum, valid, finite.
-    pub fn is_applicable(&self) -> bool {
+    pub fn has_valid_content(&self) -> bool {
         self.header.schema == Self::SCHEMA
             && self.is_intact()
             && self.valid == 1

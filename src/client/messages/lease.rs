@@ -11,7 +11,7 @@ use hexad_core::control::signals::inputs::Publishers;
 
 /// Most publishers of a topic at once, all of which are remembered: one life is meant; one more may be stopped (SIGSTOP) or dying, two are
 /// reserve.
-pub(super) const PUBLISHERS: usize = 4;
+pub(super) const MAX_PUBLISHERS: usize = 4;
 
 /// Publisher of a topic, by its messages.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ struct Known<Id> {
 /// Lease of one topic.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lease<Id> {
-    known: [Option<Known<Id>>; PUBLISHERS],
+    known: [Option<Known<Id>>; MAX_PUBLISHERS],
     /// Epoch of the publisher that counts.
     holder: Option<u64>,
     /// Silence after which a publisher has left \[ns\].
@@ -46,11 +46,11 @@ pub(super) enum Arrival {
 impl<Id: Copy> Lease<Id> {
     /// Lease without a publisher.
     pub fn new(timeout_ns: u64) -> Self {
-        Self { known: [None; PUBLISHERS], holder: None, timeout_ns }
+        Self { known: [None; MAX_PUBLISHERS], holder: None, timeout_ns }
     }
 
     /// Changes the silence after which a publisher has left \[ns\].
-    pub fn set_timeout_ns(&mut self, timeout_ns: u64) {
+    pub fn set_silence_timeout_ns(&mut self, timeout_ns: u64) {
         self.timeout_ns = timeout_ns;
     }
 
@@ -92,7 +92,7 @@ impl<Id: Copy> Lease<Id> {
     }
 
     /// Decides which publisher counts. Returns its place.
-    pub fn decide(
+    pub fn choose_holder(
         &mut self,
         now_ns: u64,
         has_control: bool,
@@ -177,7 +177,7 @@ mod tests {
                 assert!(matches!(found, Arrival::New { .. }));
             }
             let Self { lease, left, ended, .. } = self;
-            lease.decide(now_ns, has_control, |id| !left.contains(&id), |process| ended.contains(&process));
+            lease.choose_holder(now_ns, has_control, |id| !left.contains(&id), |process| ended.contains(&process));
             lease.holder.unwrap_or_default()
         }
 
@@ -231,7 +231,7 @@ mod tests {
             topic.lease.record(&message, now_ns, || process, now_ns);
             let Topic { lease, ended, .. } = topic;
             let place =
-                lease.decide(now_ns, true, |id| id == now_ns, |process| ended.contains(&process)).unwrap();
+                lease.choose_holder(now_ns, true, |id| id == now_ns, |process| ended.contains(&process)).unwrap();
             lease.known[place].unwrap().process_id
         };
         for now_ns in (100..200).step_by(4) {

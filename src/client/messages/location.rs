@@ -27,7 +27,7 @@ const TEMPORARY: &str = "/tmp";
 const TEMPORARY_NAME: &str = "hexad-";
 
 /// Folder for the files of iceoryx2.
-pub(super) const BOOKS: &str = "iceoryx2";
+pub(super) const ICEORYX_FOLDER: &str = "iceoryx2";
 /// File with the prefix.
 const PREFIX_FILE: &str = "prefix";
 /// Random bytes of a prefix, too many to try.
@@ -79,7 +79,7 @@ pub fn daemon_folders() -> Vec<PathBuf> {
 }
 
 /// User of the service, if there is one.
-pub fn system_user() -> Option<u32> {
+pub fn service_user_id() -> Option<u32> {
     metadata(SYSTEM_FOLDER).ok().filter(fs::Metadata::is_dir).map(|found| found.uid())
 }
 
@@ -170,13 +170,13 @@ impl Location {
         let path = folder.join(PREFIX_FILE);
         let (prefix, text) =
             open_prefix(&path).map_err(port_error(format!("cannot use {}", path.display())))?;
-        let books = folder.join(BOOKS);
+        let books = folder.join(ICEORYX_FOLDER);
         make_own(&books, PRIVATE_FOLDER).map_err(port_error(format!("cannot make {}", books.display())))?;
         Ok(Self { config: config(&books, &text)?, _prefix: prefix })
     }
 
     /// Reason why nothing can be created here, as an error of the system; `None` if something can.
-    pub(super) fn obstacle(&self) -> Option<String> {
+    pub(super) fn probe_writing(&self) -> Option<String> {
         let root = self.config.global.root_path().to_string();
         let name = format!("{}probe-{}", self.config.global.prefix, std::process::id());
         [root.as_str(), SEGMENTS].into_iter().find_map(|folder| {
@@ -254,7 +254,7 @@ pub(super) fn renew_prefix() -> Result<(), PortError> {
         Err(TryLockError::WouldBlock) => return Ok(()),
         Err(TryLockError::Error(error)) => return Err(failed()(error)),
     }
-    let (old, books) = (read_prefix(&file).map_err(failed())?, folder.join(BOOKS));
+    let (old, books) = (read_prefix(&file).map_err(failed())?, folder.join(ICEORYX_FOLDER));
     if !old.is_empty() {
         if has_participants(&config(&books, &old)?) {
             return Ok(());

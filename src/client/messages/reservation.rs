@@ -17,7 +17,7 @@ const SEGMENT: &str = "/dev/shm/hexad_";
 static REFUSED_BYTES: AtomicU64 = AtomicU64::new(0);
 
 /// Why the last segment could not be made, if for lack of room.
-pub(super) fn refusal() -> Option<String> {
+pub(super) fn take_refusal() -> Option<String> {
     let bytes = REFUSED_BYTES.swap(0, Ordering::Relaxed);
     (bytes > 0).then(|| format!("no room in /dev/shm for {bytes} bytes; ls -l /dev/shm shows who has it"))
 }
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn without_room_the_call_fails_and_says_so() {
         assert_eq!(reserved("/dev/shm/hexad_full", 1 << 60), (-1, 0));
-        let refusal = refusal().unwrap();
+        let refusal = take_refusal().unwrap();
         assert!(refusal.starts_with("no room in /dev/shm for 1152921504606846976 bytes"), "{refusal}");
     }
 }

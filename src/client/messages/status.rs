@@ -99,7 +99,7 @@ impl From<Diagnostic> for DiagnosticRecord {
 
 impl StatusMessage {
     /// Status of a cycle, without counters, `in_position` and `limits_scale`. `home` is the origin of the angles of X.
-    pub fn new(home: &[f64; 6], output: &Output, setpoint: Option<&Setpoint>) -> Self {
+    pub fn new(home_x: &[f64; 6], output: &Output, setpoint: Option<&Setpoint>) -> Self {
         let mut message = Self {
             state: output.state as u32,
             active_limits: output.active_limits.0,
@@ -114,7 +114,7 @@ impl StatusMessage {
         };
         if let Some(platform) = &output.platform {
             message.pose_valid = 1;
-            message.x = task_coordinates(&platform.pose, home);
+            message.x = task_coordinates(&platform.pose, home_x);
             message.twist = platform.twist.vector().into();
             message.condition = platform.condition;
             message.time_to_singularity_s = platform.time_to_singularity_s;

@@ -9,9 +9,9 @@ use nix::errno::Errno;
 use nix::sys::signal::kill;
 use nix::unistd::Pid;
 
-use super::bus::BUFFER;
+use super::bus::BUFFERED_MESSAGES;
 use super::clock::monotonic_ns;
-use super::lease::{Arrival, Lease, PUBLISHERS};
+use super::lease::{Arrival, Lease, MAX_PUBLISHERS};
 use super::{Message, Rejection, RejectionCounts};
 use hexad_core::control::signals::inputs::Publishers;
 
@@ -30,7 +30,7 @@ pub struct Subscriber<T: Message> {
 
 impl<T: Message> Subscriber<T> {
     /// Most messages that the buffers of all publishers hold: bounds the time of one call, however fast they publish.
-    const MAX_PENDING: usize = PUBLISHERS * BUFFER;
+    const MAX_PENDING: usize = MAX_PUBLISHERS * BUFFERED_MESSAGES;
 
     pub(super) fn new(
         service: PortFactory<ipc::Service, T, ()>,
@@ -85,7 +85,7 @@ impl<T: Message> Subscriber<T> {
 
     /// Number of messages: those accepted, and those that the publisher numbered in between and that found the buffer
     /// full.
-    pub fn received_count(&self) -> u64 {
+    pub fn accepted_or_lost_count(&self) -> u64 {
         self.received
     }
 
@@ -181,14 +181,14 @@ impl<T: Message> LeasedSubscriber<T> {
     }
 
     /// Changes the silence after which a publisher has left \[ns\].
-    pub fn set_timeout_ns(&mut self, timeout_ns: u64) {
-        self.lease.set_timeout_ns(timeout_ns);
+    pub fn set_silence_timeout_ns(&mut self, timeout_ns: u64) {
+        self.lease.set_silence_timeout_ns(timeout_ns);
     }
 
     /// The newest message of the publisher that counts, if one arrived since the last call.
     pub fn receive_latest(&mut self, has_control: bool) -> Option<T> {
         // All of them before the decision: after a pause of this process all publishers were silent alike.
-        let mut arrived = [const { None }; PUBLISHERS];
+        let mut arrived = [const { None }; MAX_PUBLISHERS];
         for _ in 0..Subscriber::<T>::MAX_PENDING {
             let Some((place, after, message)) = self.receive_any() else { break };
             if let Some((count, newest)) = arrived.get_mut(place).map(|slot| slot.get_or_insert((0, message)))
@@ -241,7 +241,7 @@ impl<T: Message> LeasedSubscriber<T> {
             process == 0
                 || i32::try_from(process).is_ok_and(|id| kill(Pid::from_raw(id), None) == Err(Errno::ESRCH))
         };
-        lease.decide(monotonic_ns(), has_control, |id| subscriber.is_listed(id), has_ended)
+        lease.choose_holder(monotonic_ns(), has_control, |id| subscriber.is_listed(id), has_ended)
     }
 
     /// The next message of any publisher that follows its last one: the publisher's place, by how many, and the message.

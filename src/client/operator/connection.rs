@@ -65,12 +65,12 @@ impl Connection {
     }
 
     /// User of the process that listens, from the kernel.
-    pub fn user_id(&self) -> Option<u32> {
+    pub fn peer_user_id(&self) -> Option<u32> {
         self.peer.map(|peer| peer.uid())
     }
 
     /// Process ID of the process that listens; `None` if it is not visible from here.
-    pub fn process_id(&self) -> Option<u32> {
+    pub fn peer_process_id(&self) -> Option<u32> {
         let process_id = self.peer.and_then(|peer| u32::try_from(peer.pid()).ok());
         process_id.filter(|process_id| *process_id > 0)
     }

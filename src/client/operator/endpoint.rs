@@ -88,7 +88,7 @@ impl Endpoint {
 
     /// Whether the daemon at the other end is trusted.
     pub fn counts(&self, connection: &Connection) -> bool {
-        self.is_trusted && connection.user_id().is_some_and(is_trusted)
+        self.is_trusted && connection.peer_user_id().is_some_and(is_trusted)
     }
 
     /// Text of the users that may connect.

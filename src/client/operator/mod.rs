@@ -117,7 +117,7 @@ pub struct Stranger {
 
 impl Stranger {
     fn at(endpoint: &Endpoint, connection: &Connection, said: &str) -> Self {
-        let owner = connection.user_id().unwrap_or(endpoint.owner);
+        let owner = connection.peer_user_id().unwrap_or(endpoint.owner);
         let socket = endpoint.socket.display().to_string();
         Self { owner: user_name(owner), socket, said: said.into() }
     }

@@ -20,7 +20,7 @@ use super::connection::{Attempt, Connection};
 use super::endpoint::Endpoint;
 use super::protocol::RequestLine;
 use super::users::user_name;
-use crate::messages::claim::start_time;
+use crate::messages::claim::start_ticks_since_boot;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, StatusMessage, Subscriber};
 use hexad_core::control::signals::state::{Request, State};
@@ -81,12 +81,12 @@ impl Process {
     /// The daemon of an endpoint: the process that listens there, else the recorded one.
     pub fn of(endpoint: &Endpoint, connection: Option<&Connection>) -> Option<Self> {
         let listening =
-            connection.and_then(|it| Some(Self { id: it.process_id()?, descriptor: it.process()? }));
+            connection.and_then(|it| Some(Self { id: it.peer_process_id()?, descriptor: it.process()? }));
         listening.or_else(|| {
             let recorded = endpoint.daemon.as_ref()?;
             let opened = Self { id: recorded.process_id, descriptor: open(recorded.process_id).ok()? };
             // Checked after it is opened: from now on the descriptor refers to this process.
-            (start_time(opened.id).ok()? == recorded.start_time).then_some(opened)
+            (start_ticks_since_boot(opened.id).ok()? == recorded.start_ticks).then_some(opened)
         })
     }
 

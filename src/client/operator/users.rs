@@ -2,12 +2,12 @@
 
 use nix::unistd::{Gid, Group, Uid, User};
 
-use crate::messages::location::{system_user, user_id};
+use crate::messages::location::{service_user_id, user_id};
 
 /// Whether the answer of a daemon of this user counts: it must be root, the service's user, or this user. Any
 /// other user can write a program that answers like a daemon.
 pub fn is_trusted(owner: u32) -> bool {
-    [Some(0), system_user(), Some(user_id())].contains(&Some(owner))
+    [Some(0), service_user_id(), Some(user_id())].contains(&Some(owner))
 }
 
 /// Name of a user, or its number.

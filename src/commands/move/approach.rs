@@ -10,7 +10,7 @@ use hexad_core::motion::minimum_jerk::shortest_duration;
 const APPROACH_SHARE: f64 = 0.5;
 
 /// Duration \[s\] of an approach that keeps the limits, in any direction.
-pub(super) fn approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
+pub(super) fn unhurried_approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
     let way = to - from;
     // The rotation is at most the sum of its angles.
     let angle = way.fixed_rows::<3>(0).abs().sum();
@@ -42,7 +42,7 @@ mod tests {
             let from = home + Vector6::new(0.08, -0.1, 0.09, 0.06, 0.05, -0.04);
             let precheck = Precheck::new(&config);
             let refused = |share: f64| {
-                let duration_s = share * approach_s(&config.deployment.limits.reference, &from, &home);
+                let duration_s = share * unhurried_approach_s(&config.deployment.limits.reference, &from, &home);
                 let timeline =
                     Timeline::new(&config.machine, &from, &home, 1.0).with_shortest_approach(duration_s);
                 let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));

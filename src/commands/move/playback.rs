@@ -3,7 +3,7 @@
 use nalgebra::Vector6;
 use tracing::{info, warn};
 
-use super::approach::approach_s;
+use super::approach::unhurried_approach_s;
 use super::engagement::Engagement;
 use super::path::Path;
 use super::trajectory::Trajectory;
@@ -219,7 +219,7 @@ impl<'a> Playback<'a> {
     fn timeline(&self, from: &Vector6<f64>) -> Timeline {
         let to = self.trajectory.at(0.0).x;
         let timeline = Timeline::new(&self.config.machine, from, &to, self.trajectory.duration());
-        timeline.with_shortest_approach(approach_s(&self.limits, from, &to))
+        timeline.with_shortest_approach(unhurried_approach_s(&self.limits, from, &to))
     }
 
     /// Under control: ends after an operator's request, starts again after a fault.

@@ -45,7 +45,7 @@ const ALL_LEGS: u32 = (1 << LEGS) - 1;
 const MAX_PAUSE_NS: u64 = 1_000_000_000;
 
 /// Runs the plant until `stop`.
-pub fn run(config: &Config, stop: &Stop) -> Result<(), Failure> {
+pub fn run_on_bus(config: &Config, stop: &Stop) -> Result<(), Failure> {
     let bus = config.join()?;
     if let Some(driver) = other_driver(config, &bus)? {
         let name = &config.name;
@@ -54,7 +54,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), Failure> {
         )));
     }
     let run = if bus.is_simulated() { run_in_lockstep } else { run_in_real_time };
-    Ok(run(config, &bus, stop)?)
+    Ok(run_on_bus(config, &bus, stop)?)
 }
 
 fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
@@ -166,7 +166,7 @@ impl DrivenPlant {
         self.advance_to(message.header.time_ns);
         self.code = DiagnosticCode::from_number(message.diagnostic_code).unwrap_or_default();
         let is_under_control = State::from_number(message.state).is_some_and(State::has_control);
-        let is_valid = message.is_applicable() && is_under_control;
+        let is_valid = message.has_valid_content() && is_under_control;
         let expires_ns = message.header.time_ns.saturating_add(self.timeout_ns);
         self.force = is_valid.then_some((message.force_n, expires_ns));
     }

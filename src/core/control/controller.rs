@@ -151,7 +151,7 @@ impl Controller {
         // Validate inputs.
         let clock = stamp_clock.check(&cycle, input.clock_offset_ns);
         let measurement = clock.and(measurements.validate(&cycle, input.measurement.as_ref()));
-        let setpoint = setpoints.validate(&cycle, input, supervisor.holds_pose(), reference);
+        let setpoint = setpoints.validate(&cycle, input, supervisor.holds_after_setpoint_loss(), reference);
         let reported = measurement.as_ref().ok().copied();
         let reports = [drives.check(&cycle, reported), external_pose.check(&cycle, reported)];
 
@@ -200,7 +200,7 @@ impl Controller {
             let desired = advance(&cycle, reference, next, begin_ns, &setpoint, drives.is_ready);
             let stages = (&mut memory.feedback, &mut memory.limiter);
             if let Err(diagnostic) = actuate(&cycle, begin_ns, desired, errors, stages, &mut limited) {
-                supervisor.fail(diagnostic);
+                supervisor.enter_fault(diagnostic);
             }
         }
         drives.record_sent(&limited.command_n);

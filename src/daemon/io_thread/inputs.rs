@@ -30,8 +30,8 @@ impl Inputs {
 
     /// Changes the timeouts.
     pub fn set_timeouts(&mut self, parameters: &IoParameters) {
-        self.setpoints.set_timeout_ns(parameters.setpoint_ns);
-        self.measured.set_timeout_ns(parameters.measured_ns);
+        self.setpoints.set_silence_timeout_ns(parameters.setpoint_ns);
+        self.measured.set_silence_timeout_ns(parameters.measured_ns);
     }
 
     /// The input for the next cycle.
@@ -53,7 +53,7 @@ impl Inputs {
         self.cycle.input.measured_publishers = self.measured.publishers();
         if let Some(message) = &measured {
             self.cycle.input.measurement = Some(message.into());
-            self.cycle.measurements = self.measured.subscriber().received_count();
+            self.cycle.measurements = self.measured.subscriber().accepted_or_lost_count();
         }
         measured.is_some()
     }
@@ -74,7 +74,7 @@ impl Inputs {
     /// Whether the setpoint of an instant has arrived, or none can arrive because the source has left.
     pub fn has_setpoint_of(&mut self, time_ns: u64, has_control: bool) -> bool {
         // In this order, because the source sends its last message before it leaves.
-        let has_left = self.setpoints.subscriber().received_count() > 0
+        let has_left = self.setpoints.subscriber().accepted_or_lost_count() > 0
             && self.setpoints.subscriber().publisher_count() == 0;
         self.receive_setpoint(has_control);
         has_left || self.cycle.input.setpoint.is_some_and(|setpoint| setpoint.time_ns == time_ns)

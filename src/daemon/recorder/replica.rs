@@ -62,7 +62,7 @@ impl Replica {
         let input = cycle.input().filter(|_| self.is_in_step);
         let repeated = input.map(|input| (input, self.controller.step(&input)));
         let is_equal = repeated.is_some_and(|(input, output)| {
-            CycleMessage::new(&input, &output).timed_as(cycle).bytes() == cycle.bytes()
+            CycleMessage::new(&input, &output).with_number_and_timing_of(cycle).bytes() == cycle.bytes()
         });
         if is_equal {
             return;

@@ -38,7 +38,7 @@ fn message(flag: u32) -> CycleMessage {
 fn input_and_output_go_into_a_message_and_come_back_to_the_bit() {
     let full = message(1);
     let again = CycleMessage::new(&full.input().unwrap(), &full.output().unwrap());
-    assert_eq!(again.timed_as(&full).bytes(), full.bytes());
+    assert_eq!(again.with_number_and_timing_of(&full).bytes(), full.bytes());
     let empty = message(0);
     let (input, output) = (empty.input().unwrap(), empty.output().unwrap());
     assert_eq!((input.setpoint, input.measurement, input.request), (None, None, None));

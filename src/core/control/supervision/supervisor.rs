@@ -58,7 +58,7 @@ pub(in crate::control) struct Supervisor {
 
 impl Supervisor {
     /// Whether the platform holds its pose, because setpoints were lost.
-    pub fn holds_pose(&self) -> bool {
+    pub fn holds_after_setpoint_loss(&self) -> bool {
         self.current.state == State::Engaging && self.current.diagnostic.code.holds_pose()
     }
 
@@ -83,7 +83,7 @@ impl Supervisor {
     }
 
     /// Enters the state fault, because no valid force could be computed.
-    pub fn fail(&mut self, diagnostic: Diagnostic) {
+    pub fn enter_fault(&mut self, diagnostic: Diagnostic) {
         self.current = fault(diagnostic);
     }
 }
