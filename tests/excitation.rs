@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-use hexad::analysis::excitation_design::{Sensitivities, base_parameters, base_values, design};
+use hexad::analysis::excitation_design::{Sensitivities, base_parameter_values, base_parameters, design};
 use hexad::analysis::identification::expected_deviations;
 use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
@@ -49,7 +49,10 @@ fn an_excitation_keeps_every_limit_of_the_machine() {
             assert!(legs.length_m.iter().all(|length| actuator.contains(*length)), "{place}");
             assert!(legs.rate_m_s.iter().all(|rate| rate.abs() < actuator.max_rate_m_s), "{place}");
             let force = inverse_dynamics::<Exact>(machine, &motion).unwrap();
-            assert!(force.iter().all(|force| force.abs() < actuator.available_force()), "{place}: {force:?}");
+            assert!(
+                force.iter().all(|force| force.abs() < actuator.weakest_available_force_n()),
+                "{place}: {force:?}"
+            );
         }
         assert!(reach(&config, &excitation) > 0.1, "{name}: too small to see");
     }
@@ -78,7 +81,7 @@ fn counted_periods_repeat_and_derivatives_belong_to_the_motion() {
     let ends = [excitation.at(0.0), excitation.at(excitation.duration())];
     assert!(ends.iter().all(|end| (end.x - home.x).amax() < 1e-12 && end.xd.amax() < 1e-12));
     assert!(ends.iter().all(|end| end.xdd.amax() < 1e-11));
-    let [begin, end] = excitation.counted_periods();
+    let [begin, end] = excitation.counted_interval_s();
     assert_eq!(end - begin, 3.0 * PERIOD_S);
     let h = 1e-4;
     for (t, state) in samples(&excitation, 0.037) {
@@ -126,7 +129,7 @@ fn predicted_deviations_are_those_of_least_squares() {
         for (k, coefficient) in series.0.iter_mut().enumerate() {
             *coefficient = 0.02 * (2.0 + 1.7 * k as f64).sin();
         }
-        let (base, values) = (base_parameters(machine), base_values(machine));
+        let (base, values) = (base_parameters(machine), base_parameter_values(machine));
         let mut normal = DMatrix::zeros(base.len(), base.len());
         for k in 0..1000 {
             let displacement = series.at(0.01 * f64::from(k));

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
 use hexad::analysis::identification::{
-    Cause, Load, MotionSample, Run, errors_by_period, identify, prediction_errors,
+    Cause, Load, MotionSample, Run, identify, prediction_errors, repeated_and_changing_errors,
 };
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
@@ -89,7 +89,7 @@ fn gravity_that_is_off_is_found_and_contained() {
         assert_eq!(examination.holds(), is_exact);
         let named = examination.findings.first().map(|finding| finding.cause);
         assert!(is_exact || named == Some(Cause::Gravity), "{named:?}");
-        let [same, different] = errors_by_period(&found.machine, &runs)
+        let [same, different] = repeated_and_changing_errors(&found.machine, &runs)
             .unwrap()
             .iter()
             .fold([0.0; 2], |[a, b], [same, different]| [a + same, b + different]);
@@ -97,8 +97,11 @@ fn gravity_that_is_off_is_found_and_contained() {
         println!("repeats {same}, differs {different}");
         assert!((same < 0.5 * different) == is_exact && (different - 6.0 * 0.5).abs() < 1.0);
         assert!(
-            errors_by_period(&found.machine, &[run(truth, &series, 9.0, 2.0, Load::Empty, &mut random)])
-                .is_none()
+            repeated_and_changing_errors(
+                &found.machine,
+                &[run(truth, &series, 9.0, 2.0, Load::Empty, &mut random)]
+            )
+            .is_none()
         );
         let after = found.estimate(friction);
         assert!(after.deviation > before, "{after:?} {before}");

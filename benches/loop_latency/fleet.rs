@@ -22,7 +22,7 @@ use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::realtime::clock::Monotonic;
-use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
+use hexad::realtime::cyclic::{RECORD_QUEUE_LENGTH, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::{memory, scheduling};
@@ -156,7 +156,7 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
     let cycles = (seconds * f64::from(rate_hz)) as usize;
     let mut fleet = Fleet::new(&rig.config, platforms, 1.0 / f64::from(rate_hz), cycles);
     let (side, _io_side) = exchange();
-    let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
+    let mut queue = Box::new(Queue::<CycleRecord, RECORD_QUEUE_LENGTH>::new());
     let (records_in, mut records) = queue.split();
     let stop = AtomicBool::new(false);
     let mut busy = Distribution::default();

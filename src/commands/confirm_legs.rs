@@ -77,7 +77,7 @@ impl ConfirmLegsArguments {
         client.carry_out(RequestLine { stops, ..self.engage.line(HOLD) }, |_| Ok(()))?;
         let seen = Observation::of_answer(&client.status_under_control()?, 0, &config.machine.home);
         let seen = seen.unwrap_or_default();
-        let from = seen.target.or(seen.reference_or_pose).unwrap_or(config.machine.home);
+        let from = seen.target.or(seen.reference_or_measured_x).unwrap_or(config.machine.home);
         let targets = targets(&config, &seen, &from, distance)?;
         print(legend(&config))?;
         let go = |x: [f64; 6]| {
@@ -275,8 +275,11 @@ mod tests {
             let home = config.machine.home;
             let lengths = leg_lengths(&config.machine, &pose_of(&home));
             let longest = lengths.iter().copied().fold(0.0, f64::max);
-            let seen =
-                Observation { reference_or_pose: Some(home), target: Some(home), ..Observation::default() };
+            let seen = Observation {
+                reference_or_measured_x: Some(home),
+                target: Some(home),
+                ..Observation::default()
+            };
             // The margin of the stroke is a few millimetres.
             for (room, is_longer) in [(0.1, true), (12e-3, false)] {
                 config.machine.actuator.max_length_m = longest + room;

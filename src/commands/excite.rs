@@ -14,7 +14,7 @@ use super::r#move::trajectory::Trajectory;
 use hexad_core::model::regressor::{COULOMB, REFLECTED, VISCOUS};
 use hexad_core::model::{LEGS, machine::Machine};
 use hexad_core::motion::excitation::{Excitation, PERIOD_S};
-use hexad_machine::analysis::excitation_design::{Sensitivities, base_values};
+use hexad_machine::analysis::excitation_design::{Sensitivities, base_parameter_values};
 use hexad_machine::analysis::identification::expected_deviations;
 use hexad_machine::config::Config;
 use hexad_machine::text::csv_table::trajectory_columns;
@@ -112,7 +112,7 @@ fn summary(config: &Config, excitation: &Excitation) -> String {
 
 /// Rows of the main parameters, with the largest deviation of those that a row stands for.
 fn shown(machine: &Machine, deviations: &[(usize, f64)]) -> impl Iterator<Item = [String; 5]> {
-    let values = base_values(machine);
+    let values = base_parameter_values(machine);
     let rows = [
         ("mass of platform and six rods", "kg", 0..1),
         ("first moment x, rods at their joints", "kg m", 1..2),

@@ -84,7 +84,7 @@ impl SetArguments {
         let answer = status(&config.name)?;
         let seen = Observation::of_answer(&answer, 0, &config.machine.home);
         let here = seen
-            .and_then(|seen| seen.reference_or_pose)
+            .and_then(|seen| seen.reference_or_measured_x)
             .ok_or(TargetError::UnknownPose(reason(&answer.text)))?;
         let x = task_coordinates(&frame_here(&frames, kind, &pose_of(&here)), &[0.0; 6]);
         let text = with_frame(&config.text, &NamedFrame { name: self.name, kind, x })?;

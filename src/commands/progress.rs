@@ -8,7 +8,7 @@ pub fn item_bar(count: usize, items: &str) -> ProgressBar {
 }
 
 /// Bar that advances by milliseconds over a duration.
-pub fn time_bar(seconds: f64) -> ProgressBar {
+pub fn millisecond_bar(seconds: f64) -> ProgressBar {
     bar((seconds * 1e3) as u64, "{bar:40} {elapsed} {msg}")
 }
 

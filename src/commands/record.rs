@@ -12,7 +12,7 @@ use super::failure::Failure;
 use hexad_client::operator::OperatorError;
 use hexad_client::operator::connection::Connection;
 use hexad_client::operator::protocol::{RequestLine, RequestResult};
-use hexad_client::operator::requests::ask_first;
+use hexad_client::operator::requests::query_first_trusted;
 use hexad_client::realtime::file_passing;
 use hexad_machine::text::files::{print, write_whole_with};
 
@@ -46,7 +46,7 @@ impl RecordArguments {
 /// Requests the recording of the last seconds into a file. Returns the daemon's answer as text.
 fn record(machine: &str, last_s: f64, file: &File) -> Result<String, OperatorError> {
     let line = RequestLine { last_s: Some(last_s), ..RequestLine::new("record") };
-    let answer = ask_first(machine, |connection: &mut Connection| {
+    let answer = query_first_trusted(machine, |connection: &mut Connection| {
         let text = line.to_line()?;
         let count = file_passing::send(connection.stream(), text.as_bytes(), file)?;
         connection.stream().write_all(text.as_bytes().get(count..).unwrap_or_default())?;

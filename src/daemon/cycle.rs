@@ -38,7 +38,7 @@ impl<S: FnMut(&mut Input, u64) -> Output> CyclicTask for ControllerTask<S> {
 
     fn run_cycle(&mut self, input: &mut Input, release: &Release) -> Output {
         let Release { release_ns, clock_ns, woke_ns, deadline_missed } = *release;
-        (input.release_ns, input.overrun_is_fault) = (release_ns, deadline_missed);
+        (input.release_ns, input.had_faulty_overrun) = (release_ns, deadline_missed);
         input.clock_offset_ns = release_ns.wrapping_sub(clock_ns) as i64;
         (self.0)(input, woke_ns)
     }

@@ -28,7 +28,7 @@ pub struct ThreadFiles {
 
 /// Counts since the thread began. `steal` belongs to the processor on which the thread last ran.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hints {
+pub struct SlowCycleHints {
     pub involuntary_switches: u64,
     pub page_faults: u64,
     pub steal_ms: u64,
@@ -46,7 +46,7 @@ impl ThreadFiles {
     }
 
     /// Reads the present counts. A count that cannot be read is zero.
-    pub fn read(&self) -> Hints {
+    pub fn read(&self) -> SlowCycleHints {
         let mut buffer = [0; BUFFER_BYTES];
         let status = text(&self.status, &mut buffer);
         let involuntary_switches =
@@ -57,11 +57,11 @@ impl ThreadFiles {
         let field = |index| number(stat.split_whitespace().nth(index));
         let (page_faults, processor) = (field(MINOR_FAULTS) + field(MAJOR_FAULTS), field(PROCESSOR));
         let steal_ms = steal_ticks(text(&self.processors, &mut buffer), processor) * TICK_MS;
-        Hints { involuntary_switches, page_faults, steal_ms }
+        SlowCycleHints { involuntary_switches, page_faults, steal_ms }
     }
 }
 
-impl Hints {
+impl SlowCycleHints {
     /// Increase since `earlier`. Zero for a count that decreased, as the steal of another processor may do.
     pub fn since(&self, earlier: &Self) -> Self {
         Self {

@@ -12,7 +12,7 @@ use heapless::spsc::Consumer;
 use tracing::{error, info, warn};
 
 use super::cycle::{CycleRecord, message, tracking_error};
-use super::hints::{Hints, ThreadFiles};
+use super::hints::{SlowCycleHints, ThreadFiles};
 use super::pose_search::PoseSearch;
 use super::process_names::sentence;
 use super::recorder::Recorded;
@@ -99,7 +99,7 @@ struct Log<'o> {
     state: (State, DiagnosticCode),
     /// The last two simultaneous publishers, of measurements and of setpoints.
     publishers: [Publishers; 2],
-    hints: Hints,
+    hints: SlowCycleHints,
     /// Answered offer whose first cycle has not arrived yet.
     offer: Option<&'o mut Offer>,
     /// Configuration of the next cycles, while the recorder has no room for it.
@@ -170,9 +170,9 @@ impl<'o> Log<'o> {
         let codes = [DiagnosticCode::TwoMeasuredSources, DiagnosticCode::TwoSetpointSources];
         for ((before, now), code) in self.publishers.iter_mut().zip(now).zip(codes) {
             // Once for each pair, even if one of them is silent at times.
-            if now.ignored_pid != 0 && now != *before {
+            if now.ignored_pid_or_0 != 0 && now != *before {
                 *before = now;
-                let two = Diagnostic::new(code, now.used_pid.into(), now.ignored_pid.into());
+                let two = Diagnostic::new(code, now.used_pid.into(), now.ignored_pid_or_0.into());
                 warn!(cycle = record.cycle, number = code as u32, "{}", sentence(&two));
             }
         }

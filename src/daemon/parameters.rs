@@ -15,7 +15,7 @@ use hexad_core::control::signals::pair::Pair;
 use hexad_core::model::fidelity::Fidelity;
 use hexad_core::model::machine::Machine;
 use hexad_machine::config::Config;
-use hexad_machine::config::control_loops::longest_age_s;
+use hexad_machine::config::control_loops::longest_stable_age_s;
 use hexad_machine::config::deployment::Deployment;
 
 /// Constants of the controller, for motions of its reference, which do not depend on the fidelity.
@@ -51,7 +51,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         },
         reading_errors: ReadingErrors {
             deviation_m: deployment.noise.length_m,
-            resolution_m: deployment.noise.length_step_m,
+            resolution_or_0_m: deployment.noise.length_step_m,
         },
         force_delay_ns: nanoseconds(deployment.drive.total_delay_s()),
         fidelity,
@@ -63,7 +63,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         measured_timeout_ns: nanoseconds(timeouts.measured_s),
         ready_timeout_ns: nanoseconds(deployment.drive.ready_timeout_s),
         pose_tolerance_m: deployment.noise.pose_tolerance_m,
-        max_age_at_arrival_ns: nanoseconds(longest_age_s(deployment)),
+        max_age_at_arrival_ns: nanoseconds(longest_stable_age_s(deployment)),
         longest_cycle_gap_ns: nanoseconds(longest_pause_s(deployment)),
         limits: limits.in_force(),
         limits_scale: limits.scale,

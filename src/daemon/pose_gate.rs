@@ -144,7 +144,7 @@ impl PoseWatch {
     }
 
     /// Sets the number of other poses in the input of a cycle. A selected pose becomes its external pose.
-    pub fn answer_search(&self, input: &mut Input) {
+    pub fn apply_search_result(&self, input: &mut Input) {
         input.other_poses = parts(self.gate.word.load(Ordering::Acquire)).1;
         if let Some(measurement) = &mut input.measurement
             && self.gate.is_chosen.swap(false, Ordering::Acquire)

@@ -87,7 +87,7 @@ fn search(machine: &Machine, gate: &PoseGate, here: &KinematicState, found: u32)
     let list = gate.list(machine, poses);
     if !others.poses.is_empty() {
         warn!("several poses have the measured leg lengths, so control does not begin: {list}");
-    } else if others.are_all {
+    } else if others.is_proved_complete {
         info!("no other permitted pose has the measured leg lengths: proved");
     } else {
         info!(

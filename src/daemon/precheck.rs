@@ -66,8 +66,9 @@ impl Precheck {
         let at_home = KinematicState::new(&self.machine, self.machine.home_pose()).sensitivity().condition;
         *max_condition = at_home + USABLE_SHARE * (*max_condition - at_home);
         let drives = DriveCapability::new(&self.machine, &self.machine.home_pose());
-        let available = self.machine.actuator.available_force();
-        let at_home = drives.map_or(0.0, |drives| drives.hardest_held().1 / (MAX_HOLDING_SHARE * available));
+        let available = self.machine.actuator.weakest_available_force_n();
+        let at_home =
+            drives.map_or(0.0, |drives| drives.largest_holding_force().1 / (MAX_HOLDING_SHARE * available));
         self.machine.actuator.max_force_n *= at_home + USABLE_SHARE * (1.0 - at_home);
         self
     }

@@ -175,7 +175,8 @@ impl Replayer {
         };
         self.next_cycle = Some(cycle.cycle + 1);
         self.replay.compared += 1;
-        let replayed = CycleMessage::new(&input, &self.controller.step(&input)).with_number_and_timing_of(cycle);
+        let replayed =
+            CycleMessage::new(&input, &self.controller.step(&input)).with_number_and_timing_of(cycle);
         if replayed.bytes() == cycle.bytes() {
             return;
         }

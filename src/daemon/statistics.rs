@@ -2,7 +2,7 @@
 //! construction allocates.
 
 use super::cycle::{CycleRecord, measured_age_ns};
-use super::hints::Hints;
+use super::hints::SlowCycleHints;
 use super::time_histogram::TimeHistogram;
 use hexad_client::messages::{LoopTimes, StatisticsMessage, WORST_CYCLES, WorstCycle};
 
@@ -71,7 +71,7 @@ impl CycleStatistics {
     }
 
     /// Adds the hints for the cycles added since the last call.
-    pub fn add_hints(&mut self, hints: &Hints) {
+    pub fn add_hints(&mut self, hints: &SlowCycleHints) {
         let clipped = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
         for cycle in self.worst.iter_mut().filter(|cycle| cycle.cycle > self.hinted) {
             cycle.involuntary_switches = clipped(hints.involuntary_switches);
@@ -134,10 +134,10 @@ mod tests {
     fn the_worst_cycles_carry_the_hints_of_their_own_time() {
         let mut collector = CycleStatistics::default();
         (1..=20).for_each(|cycle| collector.add(&record(cycle, 100 + cycle)));
-        collector.add_hints(&Hints { steal_ms: 20, ..Hints::default() });
+        collector.add_hints(&SlowCycleHints { steal_ms: 20, ..SlowCycleHints::default() });
         collector.add(&record(21, 5000));
         collector.add(&record(22, 1));
-        collector.add_hints(&Hints { involuntary_switches: 3, ..Hints::default() });
+        collector.add_hints(&SlowCycleHints { involuntary_switches: 3, ..SlowCycleHints::default() });
         let worst = collector.statistics().worst;
         assert_eq!(worst.map(|cycle| cycle.cycle), [21, 20, 19, 18, 17, 16, 15, 14]);
         assert_eq!(worst.map(|cycle| cycle.steal_ms), [0, 20, 20, 20, 20, 20, 20, 20]);

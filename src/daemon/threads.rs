@@ -40,7 +40,7 @@ use super::{DaemonError, REALTIME_THREAD};
 use hexad_client::messages::StatisticsMessage;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::realtime::clock::Monotonic;
-use hexad_client::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode};
+use hexad_client::realtime::cyclic::{LoopReport, RECORD_QUEUE_LENGTH, ReleaseMode};
 use hexad_client::realtime::event::Event;
 use hexad_client::realtime::exchange::exchange;
 use hexad_client::realtime::process::block_signals;
@@ -105,7 +105,7 @@ pub(super) fn run(
     let (return_offer, returned) = channel();
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();
-    let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
+    let mut record_queue = Box::new(Queue::<CycleRecord, RECORD_QUEUE_LENGTH>::new());
     let (record_producer, records) = record_queue.split();
     let mut delay_queue = Box::new(Queue::<u64, DELAYS>::new());
     let (delay_producer, delays) = delay_queue.split();
@@ -283,7 +283,7 @@ fn run_realtime(
         handover.answer_offer(&mut controller, woke_ns);
         memories.begin_cycle(controller.memory());
         input.request = intake.next(word.load(), woke_ns, input.release_ns);
-        watch.answer_search(input);
+        watch.apply_search_result(input);
         let output = controller.step(input);
         watch.end_cycle(input.release_ns, output.platform.map(|platform| platform.pose));
         output

@@ -52,7 +52,7 @@ impl Axis {
         let (first, last) = ((low / step - 0.02).ceil(), (high / step + 0.02).floor());
         let (low, high) = (low.min(first * step), high.max(last * step));
         let ticks = (first as i64..=last as i64).map(|tick| tick as f64 * step).collect();
-        let exponent = exponent_of(label, first.abs().max(last.abs()) * step);
+        let exponent = displayed_exponent(label, first.abs().max(last.abs()) * step);
         // 1099.995 mm rather than 1.099995 m.
         let exponent = if power < -4 { exponent.min(-3) } else { exponent };
         Self { low, high, ticks, label: label.into(), exponent, step_power: power }
@@ -139,7 +139,7 @@ fn is_flat(low: f64, high: f64) -> bool {
 
 /// Power of ten to take out of numbers up to a size: if the unit takes prefixes, the largest number is from 1 to 1000;
 /// else only very large and very small numbers have one.
-pub fn exponent_of(label: &str, size: f64) -> i32 {
+pub fn displayed_exponent(label: &str, size: f64) -> i32 {
     if size < FLAT_SPAN {
         return 0;
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use hexad::analysis::held_forces::HeldForces;
 use hexad::config::Config;
-use hexad::config::control_loops::longest_age_s;
+use hexad::config::control_loops::longest_stable_age_s;
 use hexad::control::controller::Controller;
 use hexad::control::parameters::Parameters;
 use hexad::control::signals::diagnostic::DiagnosticCode;
@@ -86,7 +86,7 @@ fn certificate_ages_are_stood_without_an_oscillation_or_refused() {
     let all = loops.into_iter().flat_map(|of| MASSES.map(|mass| (of, mass)));
     cases(all, 4).into_par_iter().for_each(|((machine, lines), mass)| {
         let config = configured(machine, lines);
-        let bound_ms = 1e3 * longest_age_s(&config.deployment);
+        let bound_ms = 1e3 * longest_stable_age_s(&config.deployment);
         let timeout_ms = 1e3 * config.deployment.timeouts.measured_s;
         println!("{machine} {lines:?}: {bound_ms:.2} ms");
         assert!((10.0..100.0).contains(&bound_ms), "{bound_ms}");
@@ -130,7 +130,7 @@ fn certificate_near_singular_poses_ages_are_stood_without_an_oscillation_or_refu
     cases(all, 2).into_par_iter().for_each(|((machine, lines), mass)| {
         let (config, pole) = at_fastest_pose(machine, &format!("{lines}[timeouts]\nmeasured_ms = 200.0\n"));
         let period_ms = 1e3 * config.deployment.realtime.period_s();
-        let bound_ms = 1e3 * longest_age_s(&config.deployment);
+        let bound_ms = 1e3 * longest_stable_age_s(&config.deployment);
         let periods = (bound_ms / period_ms - 0.5).floor();
         println!("{machine} {lines:?}: {pole:.1}/s, {bound_ms:.2} ms, {periods} periods");
         let ages = [1.0, periods, periods + 2.0].map(|periods| (periods, (periods + 0.5) * period_ms));
@@ -149,7 +149,7 @@ fn certificate_near_singular_poses_ages_are_stood_without_an_oscillation_or_refu
 #[test]
 fn near_singular_poses_measurements_twice_as_old_would_lose_the_platform() {
     let (config, _) = at_fastest_pose("tsai2000", "[limits]\ncondition = 50.0\n");
-    let age_ms = 2.0 * 1e3 * longest_age_s(&config.deployment);
+    let age_ms = 2.0 * 1e3 * longest_stable_age_s(&config.deployment);
     let accepting = Parameters {
         max_age_at_arrival_ns: A_SECOND_NS,
         measured_timeout_ns: A_SECOND_NS,

@@ -66,7 +66,7 @@ fn a_missed_deadline_ends_control() {
     let config = deployed("motion_base");
     let (mut rig, task) = in_motion(&config);
     let mut input = rig.input(&task);
-    input.overrun_is_fault = true;
+    input.had_faulty_overrun = true;
     let output = rig.cycle(&input);
     assert_eq!((output.state, output.diagnostic.code), (State::Stopping, DiagnosticCode::DeadlineMissed));
 }

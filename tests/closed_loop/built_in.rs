@@ -74,7 +74,7 @@ fn first_refusal(
 /// A machine whose drives have this multiple of the force that holds it at home.
 fn weak(name: &str, share: f64) -> Config {
     let machine = with_force(name, 1e6).machine;
-    let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().hardest_held();
+    let (_, held) = DriveCapability::new(&machine, &machine.home_pose()).unwrap().largest_holding_force();
     with_force(name, share * held)
 }
 

@@ -137,10 +137,10 @@ fn legs_that_move_together_have_the_gain_of_the_law_on_average() {
         let legs = LegMasses::at_home(&deployed(name).machine);
         println!("{name}: {legs:?}");
         assert!(
-            0.0 < legs.softest_mode_gain
-                && legs.softest_mode_gain < 1.0
-                && 1.0 < legs.stiffest_mode_gain
-                && legs.stiffest_mode_gain < 6.0
+            0.0 < legs.softest_mode_gain_ratio
+                && legs.softest_mode_gain_ratio < 1.0
+                && 1.0 < legs.stiffest_mode_gain_ratio
+                && legs.stiffest_mode_gain_ratio < 6.0
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use hexad::analysis::fidelity_choice::FidelityComparison;
 use hexad::config::Config;
-use hexad::config::control_loops::longest_age_s;
+use hexad::config::control_loops::longest_stable_age_s;
 use hexad::config::deployment::{Deployment, FidelityChoice};
 use hexad::config::fidelity::{envelope, fidelity, reason};
 use hexad::control::law::estimator::SENT_ACCELERATIONS;
@@ -232,7 +232,7 @@ fn measurements_are_no_older_than_what_the_estimator_remembers() {
     let bandwidths = "[control]\nposition_bandwidth_hz = 5.0\norientation_bandwidth_hz = 5.0\n";
     let text = format!("{FRIED}[realtime]\nrate_hz = 20_000\n{bandwidths}[timeouts]\nmeasured_ms = 10.0\n");
     let Config { deployment, .. } = Config::parse(&text, "a test").expect("a valid file");
-    let oldest_s = longest_age_s(&deployment) + deployment.drive.total_delay_s();
+    let oldest_s = longest_stable_age_s(&deployment) + deployment.drive.total_delay_s();
     let remembered_s = (SENT_ACCELERATIONS - 1) as f64 * deployment.realtime.period_s();
     assert!((oldest_s - remembered_s).abs() < 1e-12, "{oldest_s} s of {remembered_s} s");
 }

@@ -11,7 +11,7 @@ use hexad::control::signals::inputs::{Input, Measurement};
 use hexad::daemon::cycle::{CycleInput, CycleRecord, IoSide, run};
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;
-use hexad::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode, Timing};
+use hexad::realtime::cyclic::{LoopReport, RECORD_QUEUE_LENGTH, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 
@@ -25,7 +25,7 @@ fn drive(number: u64) -> u64 {
 }
 
 fn message(number: u64) -> CycleInput {
-    let mut handed = CycleInput { measurements: number, handed_ns: monotonic_ns(), ..CycleInput::default() };
+    let mut handed = CycleInput { measurements: number, written_ns: monotonic_ns(), ..CycleInput::default() };
     handed.input.measurement = Some(Measurement { time_ns: drive(number), ..Measurement::default() });
     handed
 }
@@ -65,11 +65,11 @@ impl Loop {
         };
         let stopped = stop.clone();
         let running = spawn(move || {
-            let mut queue = Queue::<CycleRecord, RECORDS>::new();
+            let mut queue = Queue::<CycleRecord, RECORD_QUEUE_LENGTH>::new();
             let (records_in, mut records) = queue.split();
             let mut seen = vec![];
             let step = |input: &mut Input, _: u64| {
-                seen.push((input.release_ns, input.overrun_is_fault));
+                seen.push((input.release_ns, input.had_faulty_overrun));
                 if slow.is_some_and(|number| input.release_ns == drive(number)) {
                     sleep(Duration::from_nanos(2 * DRIVE_PERIOD_NS));
                 }

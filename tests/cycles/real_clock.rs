@@ -11,7 +11,7 @@ use hexad::daemon::cycle::{CycleRecord, run};
 use hexad::messages::LoopCounters;
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::{Clock, sleep_until};
-use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
+use hexad::realtime::cyclic::{RECORD_QUEUE_LENGTH, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::scheduling;
@@ -57,7 +57,7 @@ struct Cycle {
 
 fn perform(release: ReleaseMode, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<CycleRecord>, LoopCounters) {
     let (side, _io) = exchange();
-    let mut queue = Queue::<CycleRecord, RECORDS>::new();
+    let mut queue = Queue::<CycleRecord, RECORD_QUEUE_LENGTH>::new();
     let (records_in, mut records) = queue.split();
     let stop = AtomicBool::new(false);
     let timing = Timing {
@@ -75,7 +75,7 @@ fn perform(release: ReleaseMode, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<
         if burns(seen.len() as u64 + 1) {
             while monotonic_ns() < began_ns + PERIOD_NS * 5 / 2 {}
         }
-        let (due_ns, told) = (input.release_ns, input.overrun_is_fault);
+        let (due_ns, told) = (input.release_ns, input.had_faulty_overrun);
         seen.push(Cycle { due_ns, began_ns, ended_ns: monotonic_ns(), told });
         stop.store(seen.len() as u64 == CYCLES, Ordering::Relaxed);
         Output::default()

@@ -9,7 +9,7 @@ use hexad::control::signals::inputs::Input;
 use hexad::daemon::cycle::{CycleRecord, run};
 use hexad::messages::LoopCounters;
 use hexad::realtime::clock::Clock;
-use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
+use hexad::realtime::cyclic::{RECORD_QUEUE_LENGTH, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 
@@ -82,7 +82,7 @@ pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Ve
         late_wakeup_ns: LATE_NS,
     };
     let (side, _io) = exchange();
-    let mut queue = Queue::<CycleRecord, RECORDS>::new();
+    let mut queue = Queue::<CycleRecord, RECORD_QUEUE_LENGTH>::new();
     let (records_in, mut records) = queue.split();
     let stop = AtomicBool::new(false);
     let mut begun: Vec<Seen> = vec![];
@@ -90,7 +90,7 @@ pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Ve
     let step = |input: &mut Input, _: u64| {
         // The record of the cycle before; the queue never fills.
         written.extend(records.dequeue());
-        let (due_ns, began_ns, told_of_miss) = (input.release_ns, now_ns.get(), input.overrun_is_fault);
+        let (due_ns, began_ns, told_of_miss) = (input.release_ns, now_ns.get(), input.had_faulty_overrun);
         begun.push(Seen { due_ns, began_ns, told_of_miss, wakeup_ns: 0, compute_ns: 0 });
         now_ns.set(began_ns + burns_ns.next().unwrap_or(&100));
         stop.store(begun.len() == cycles, Ordering::Relaxed);

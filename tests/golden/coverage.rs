@@ -70,9 +70,9 @@ impl Seen {
             self.add_if(is_given == [false, false, true, false], "a part of the status of the drives");
         }
         self.add_if(input.clock_offset_ns != 0, "another clock");
-        self.add_if(input.setpoint_publishers.ignored_pid != 0, "two sources of setpoints");
-        self.add_if(input.measured_publishers.ignored_pid != 0, "two sources of measurements");
-        self.add_if(input.overrun_is_fault, "a missed deadline");
+        self.add_if(input.setpoint_publishers.ignored_pid_or_0 != 0, "two sources of setpoints");
+        self.add_if(input.measured_publishers.ignored_pid_or_0 != 0, "two sources of measurements");
+        self.add_if(input.had_faulty_overrun, "a missed deadline");
     }
 
     /// The output of an input that follows another output.

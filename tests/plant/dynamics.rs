@@ -39,7 +39,7 @@ fn the_smallest_leg_mass_is_a_bound() {
         machine.gravity_m_s2.fill(0.0);
         let dynamics = ForwardDynamics::new(&machine);
         for Motion { pose, .. } in motions(name) {
-            let smallest = dynamics.smallest_leg_mass(&pose).unwrap();
+            let smallest = dynamics.smallest_effective_leg_mass_kg(&pose).unwrap();
             for k in 0..6 {
                 let force: [f64; 6] = Vector6::ith(k, 1.0).into();
                 let acceleration = dynamics.acceleration(&pose, &Twist::default(), &force).unwrap();
@@ -59,5 +59,5 @@ fn no_pose_no_acceleration() {
     let mut motion = motions("fried2008")[0];
     motion.pose.position.fill(f64::NAN);
     assert_eq!(dynamics.acceleration(&motion.pose, &motion.twist, &[0.0; 6]), None::<Acceleration>);
-    assert_eq!(dynamics.smallest_leg_mass(&motion.pose), None);
+    assert_eq!(dynamics.smallest_effective_leg_mass_kg(&motion.pose), None);
 }

@@ -18,7 +18,7 @@ fn no_motion_changes_an_acceleration_faster_than_the_bounds_of_the_jerk() {
         let pose = machine.home_pose().displaced(&displacement(0.01 * machine.joints.radius_m));
         let rest = Motion { pose, twist: Twist::default(), acceleration: Acceleration::default() };
         let forces = inverse_dynamics::<Exact>(&machine, &rest).unwrap();
-        let bounds = HeldForces::new(&machine).jerk_bounds(&pose, &limits).unwrap();
+        let bounds = HeldForces::new(&machine).angular_and_linear_jerk_bounds(&pose, &limits).unwrap();
         let (mut most, dt) = ([0.0_f64; 2], 1e-5);
         for _ in 0..5_000 {
             let velocity = displacement(1.0);

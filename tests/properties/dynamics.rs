@@ -98,7 +98,7 @@ proptest! {
         let back = Vector6::from(transmission.commands(&forces));
         prop_assert!((back - commands).amax() < 1e-12);
         // Whatever the rates, the available force takes no more than the largest command.
-        for force in [actuator.available_force(), -actuator.available_force()] {
+        for force in [actuator.weakest_available_force_n(), -actuator.weakest_available_force_n()] {
             let most = transmission.commands(&[force; 6]).into_iter().map(f64::abs).fold(0.0, f64::max);
             prop_assert!(most <= actuator.max_force_n * (1.0 + 1e-12));
         }

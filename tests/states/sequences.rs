@@ -152,7 +152,7 @@ impl Watched {
             Wrong::OldMeasurement => measured.time_ns -= 1_000_000_000,
             Wrong::FarSetpoint => setpoint.task.x[4] += 0.03,
             Wrong::FarMeasurement => measured.length_m[4] += 0.03,
-            Wrong::DeadlineMissed => input.overrun_is_fault = true,
+            Wrong::DeadlineMissed => input.had_faulty_overrun = true,
         }
         input
     }

@@ -17,11 +17,11 @@ pub enum Host {
     Machine,
     Remote,
     /// On another interface of the machine's host.
-    Stranger,
+    UntrustedDaemon,
 }
 
 impl Host {
-    const ALL: [Self; 3] = [Self::Machine, Self::Remote, Self::Stranger];
+    const ALL: [Self; 3] = [Self::Machine, Self::Remote, Self::UntrustedDaemon];
 }
 
 /// The hosts, a folder with files, and the processes that run on the hosts.
@@ -47,7 +47,7 @@ impl Hosts {
             ip(&format!("netns add {}", hosts.namespace(host)))?;
             hosts.ip(host, "link set lo up")?;
         }
-        for (port, remote, network) in [("net0", Host::Remote, 1), ("net1", Host::Stranger, 2)] {
+        for (port, remote, network) in [("net0", Host::Remote, 1), ("net1", Host::UntrustedDaemon, 2)] {
             let there = hosts.namespace(remote);
             hosts.ip(Host::Machine, &format!("link add {port} type veth peer name eth0 netns {there}"))?;
             for (host, port, number) in [(Host::Machine, port, 1), (remote, "eth0", 2)] {

@@ -62,7 +62,8 @@ fn a_machine_with_its_payload_is_at_the_limit_in_motion_or_at_rest() {
         let pose = TaskState::at_rest(beside_home(&machine, 1, 0.1)).motion().pose;
         let demand = AccelerationDemand { linear_m_s2: demand, angular_rad_s2: demand };
         let quality = |machine: &Machine| PoseEvaluator::new(machine, demand).quality(&pose);
-        let held = |machine: &Machine| DriveCapability::new(machine, &pose).unwrap().hardest_held().1;
+        let held =
+            |machine: &Machine| DriveCapability::new(machine, &pose).unwrap().largest_holding_force().1;
         // Whatever the machine: it can carry something.
         machine.actuator.max_force_n = 2.0 * quality(&machine).worst_force_n;
         let payload = quality(&machine).payload_kg;

@@ -23,7 +23,7 @@ fn the_usable_region_is_searched_to_its_edge() {
     let [short, long] = [100, 300].map(|count| search(&tsai, count));
     assert!(0 < short.ambiguous_poses && short.ambiguous_poses < long.ambiguous_poses, "{short:?} {long:?}");
     assert!(long.ambiguous_from_rad <= short.ambiguous_from_rad && long.at_home.is_none(), "{long:?}");
-    let words = search(&tsai.within_margin(tsai.actuator.stroke()), 200).to_string();
+    let words = search(&tsai.with_stroke_margin(tsai.actuator.stroke()), 200).to_string();
     assert!(words.ends_with("none found up to 0 deg (searched, 1 poses)"), "home is not usable: {words}");
     let words = search(&Machine { max_rotation_rad: FRAC_PI_2, ..tsai }, 300).to_string();
     assert!(words.starts_with("at home 48.7 deg and 1.14 m away; in the usable region from "), "{words}");
@@ -36,7 +36,7 @@ fn poses_with_another_permitted_pose_are_counted_and_hatched() {
         let (folder, config) = (TempDir::new().unwrap(), deployed(name));
         let text = said(name, folder.path(), &["--json", "--resolution", "21", "--plane", plane]);
         let report: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let machine = config.machine.within_margin(config.deployment.limits.stroke_margin_m);
+        let machine = config.machine.with_stroke_margin(config.deployment.limits.stroke_margin_m);
         let clearance = Clearance::new(&machine, report["condition_limit"].as_f64().unwrap());
         let table = Table::read(&folder.path().join(format!("{plane}.csv")));
         let poses = (0..table.rows.len()).map(|row| rigid(table.coordinates(row, "").into()));

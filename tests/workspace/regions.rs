@@ -195,7 +195,7 @@ fn sharpest(names: &[&str], cells: u32, reach: f64, poses: u32) -> (u32, f64) {
                 let keeps = Clearance::new(machine, limit).is_regular(shape, &cell);
                 (low, high) = if keeps { (low, limit) } else { (limit, high) };
             }
-            let least = Clearance::new(machine, 100.0).least_margin(shape, &cell);
+            let least = Clearance::new(machine, 100.0).least_stroke_margin(shape, &cell);
             let mut worst = 0.0_f64;
             for j in 0..poses {
                 let corner: [f64; 6] =

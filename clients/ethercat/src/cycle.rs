@@ -156,7 +156,7 @@ impl<D: Daemon> Driver<D> {
             measured.brake_open |= u32::from(drive.is_brake_open(stamp_ns)) << index;
             measured.drive_fault |= u32::from(drive.state().is_fault()) << index;
         }
-        measured.drive_fault |= if self.has_bus_failed { DriveStatus::BUS_FAILED } else { 0 };
+        measured.drive_fault |= if self.has_bus_failed { DriveStatus::BUS_FAILED_BIT } else { 0 };
         self.daemon.publish(stamp_ns, measured);
     }
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::bus::{PortError, port_error};
 use super::location::{
-    PRIVATE_FILE, SYSTEM_FOLDER, daemon_folders, entries, open_private, open_user_folder, renew_prefix,
+    PRIVATE_FILE, SYSTEM_FOLDER, daemon_folders, entries, make_user_folder, open_private, renew_prefix,
     service_user_id, user_folders, user_id,
 };
 
@@ -59,7 +59,7 @@ impl Claim {
     /// Daemons of other users do not count: they reach no participant of this user, and could block the
     /// machine for good.
     pub fn take(machine: &str) -> Result<Self, PortError> {
-        open_user_folder()?;
+        make_user_folder()?;
         let (mut folders, system_user) = (user_folders(), service_user_id());
         let system = PathBuf::from(SYSTEM_FOLDER);
         if user_id() == 0 && !folders.contains(&system) && system_user.is_some() {
@@ -214,8 +214,14 @@ pub fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let is_alive = start_ticks_since_boot(process_id).is_ok_and(|started| started == recorded_start);
     let is_of_one_user = process_user(process_id)? == owner && [folder_owner, 0].contains(&owner);
     let machine = machine.to_owned();
-    let found =
-        RunningDaemon { machine, process_id, start_ticks: recorded_start, user_id: owner, socket, processors };
+    let found = RunningDaemon {
+        machine,
+        process_id,
+        start_ticks: recorded_start,
+        user_id: owner,
+        socket,
+        processors,
+    };
     (is_alive && is_of_one_user).then_some(found)
 }
 
@@ -246,7 +252,7 @@ mod tests {
         assert_eq!(running_daemons(&machine), []);
         let mut claim = Claim::take(&machine).unwrap();
         assert_eq!(running_daemons(&machine), [], "nothing is recorded yet");
-        let socket = open_user_folder().unwrap().join(format!("{machine}.sock"));
+        let socket = make_user_folder().unwrap().join(format!("{machine}.sock"));
         let processors = vec![1022, 1023];
         claim.record(&socket, &processors).unwrap();
         let (process_id, user_id) = (std::process::id(), user_id());
@@ -273,7 +279,7 @@ mod tests {
     #[test]
     fn a_record_of_a_process_that_has_ended_does_not_count() {
         let machine = format!("dead-test-{}", std::process::id());
-        let folder = open_user_folder().unwrap();
+        let folder = make_user_folder().unwrap();
         let path = folder.join(format!("{machine}.daemon"));
         let process_id = std::process::id();
         let started = start_ticks_since_boot(process_id).unwrap();

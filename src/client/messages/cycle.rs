@@ -161,13 +161,13 @@ impl CycleMessage {
     }
 
     fn set_input(&mut self, input: &Input) {
-        (self.release_ns, self.deadline_missed) = (input.release_ns, u32::from(input.overrun_is_fault));
+        (self.release_ns, self.deadline_missed) = (input.release_ns, u32::from(input.had_faulty_overrun));
         self.other_poses = input.other_poses;
         self.clock_offset_ns = input.clock_offset_ns.cast_unsigned();
-        let Publishers { used_pid, ignored_pid } = input.setpoint_publishers;
-        (self.setpoint_process, self.setpoint_process_ignored) = (used_pid, ignored_pid);
-        let Publishers { used_pid, ignored_pid } = input.measured_publishers;
-        (self.measured_process, self.measured_process_ignored) = (used_pid, ignored_pid);
+        let Publishers { used_pid, ignored_pid_or_0 } = input.setpoint_publishers;
+        (self.setpoint_process, self.setpoint_process_ignored) = (used_pid, ignored_pid_or_0);
+        let Publishers { used_pid, ignored_pid_or_0 } = input.measured_publishers;
+        (self.measured_process, self.measured_process_ignored) = (used_pid, ignored_pid_or_0);
         if let Some(Setpoint { kind, time_ns, task, target_speed_share }) = input.setpoint {
             self.setpoint_target_speed = target_speed_share;
             (self.has_setpoint, self.setpoint_kind, self.setpoint_time_ns) = (1, kind as u32, time_ns);
@@ -266,13 +266,13 @@ impl CycleMessage {
             request,
             setpoint_publishers: Publishers {
                 used_pid: self.setpoint_process,
-                ignored_pid: self.setpoint_process_ignored,
+                ignored_pid_or_0: self.setpoint_process_ignored,
             },
             measured_publishers: Publishers {
                 used_pid: self.measured_process,
-                ignored_pid: self.measured_process_ignored,
+                ignored_pid_or_0: self.measured_process_ignored,
             },
-            overrun_is_fault: self.deadline_missed == 1,
+            had_faulty_overrun: self.deadline_missed == 1,
             other_poses: self.other_poses,
         })
     }

@@ -120,7 +120,7 @@ impl<Id: Copy> Lease<Id> {
     pub fn publishers(&self, now_ns: u64, is_listed: impl Fn(Id) -> bool) -> Publishers {
         let used_pid = self.holding().map_or(0, |known| known.process_id);
         let mut others = self.others(now_ns).filter(|known| is_listed(known.id));
-        Publishers { used_pid, ignored_pid: others.next().map_or(0, |known| known.process_id) }
+        Publishers { used_pid, ignored_pid_or_0: others.next().map_or(0, |known| known.process_id) }
     }
 
     fn place(&self, epoch: Option<u64>) -> Option<usize> {
@@ -177,14 +177,19 @@ mod tests {
                 assert!(matches!(found, Arrival::New { .. }));
             }
             let Self { lease, left, ended, .. } = self;
-            lease.choose_holder(now_ns, has_control, |id| !left.contains(&id), |process| ended.contains(&process));
+            lease.choose_holder(
+                now_ns,
+                has_control,
+                |id| !left.contains(&id),
+                |process| ended.contains(&process),
+            );
             lease.holder.unwrap_or_default()
         }
 
         fn publishers(&self, now_ns: u64) -> [u32; 2] {
-            let Publishers { used_pid, ignored_pid } =
+            let Publishers { used_pid, ignored_pid_or_0 } =
                 self.lease.publishers(now_ns, |id| !self.left.contains(&id));
-            [used_pid, ignored_pid]
+            [used_pid, ignored_pid_or_0]
         }
     }
 
@@ -230,8 +235,9 @@ mod tests {
             (message.header.epoch, message.header.sequence) = (now_ns, 1);
             topic.lease.record(&message, now_ns, || process, now_ns);
             let Topic { lease, ended, .. } = topic;
-            let place =
-                lease.choose_holder(now_ns, true, |id| id == now_ns, |process| ended.contains(&process)).unwrap();
+            let place = lease
+                .choose_holder(now_ns, true, |id| id == now_ns, |process| ended.contains(&process))
+                .unwrap();
             lease.known[place].unwrap().process_id
         };
         for now_ns in (100..200).step_by(4) {

@@ -34,7 +34,7 @@ const PREFIX_FILE: &str = "prefix";
 const PREFIX_BYTES: usize = 8;
 /// Longest prefix that is read \[bytes\].
 const MAX_PREFIX_BYTES: u64 = 64;
-pub(super) const SEGMENTS: &str = "/dev/shm";
+pub(super) const SEGMENT_FOLDER: &str = "/dev/shm";
 
 /// A port that cannot be opened must not block the I/O thread for the default second.
 const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
@@ -46,7 +46,7 @@ pub(super) const PRIVATE_FILE: u32 = 0o600;
 const USER_FOLDER: u32 = 0o755;
 const PRIVATE_FOLDER: u32 = 0o700;
 /// Permissions that let others write in a folder.
-pub const OTHERS_WRITE: u32 = 0o022;
+pub const OTHERS_WRITE_MODE: u32 = 0o022;
 
 /// User of this process.
 pub fn user_id() -> u32 {
@@ -114,7 +114,7 @@ fn entries_with(folder: &str, beginning: &str) -> impl Iterator<Item = PathBuf> 
 }
 
 /// Makes the folder of this user if it is missing, whatever folders other users have made.
-pub fn open_user_folder() -> Result<PathBuf, PortError> {
+pub fn make_user_folder() -> Result<PathBuf, PortError> {
     let mut folder = user_folder();
     for others in 1.. {
         let is_temporary = folder.parent() == Some(Path::new(TEMPORARY));
@@ -144,8 +144,9 @@ fn make_own(folder: &Path, mode: u32) -> io::Result<()> {
 }
 
 fn is_own(folder: &Path) -> bool {
-    symlink_metadata(folder)
-        .is_ok_and(|found| found.is_dir() && found.uid() == user_id() && found.mode() & OTHERS_WRITE == 0)
+    symlink_metadata(folder).is_ok_and(|found| {
+        found.is_dir() && found.uid() == user_id() && found.mode() & OTHERS_WRITE_MODE == 0
+    })
 }
 
 /// Opens a file that belongs to this user alone. Follows no link.
@@ -166,7 +167,7 @@ pub(super) struct Location {
 impl Location {
     /// Location of this user. Makes it if it is missing.
     pub(super) fn open() -> Result<Self, PortError> {
-        let folder = open_user_folder()?;
+        let folder = make_user_folder()?;
         let path = folder.join(PREFIX_FILE);
         let (prefix, text) =
             open_prefix(&path).map_err(port_error(format!("cannot use {}", path.display())))?;
@@ -179,7 +180,7 @@ impl Location {
     pub(super) fn probe_writing(&self) -> Option<String> {
         let root = self.config.global.root_path().to_string();
         let name = format!("{}probe-{}", self.config.global.prefix, std::process::id());
-        [root.as_str(), SEGMENTS].into_iter().find_map(|folder| {
+        [root.as_str(), SEGMENT_FOLDER].into_iter().find_map(|folder| {
             let probe = Path::new(folder).join(&name);
             let written = fs::write(&probe, [0; 1]);
             let _ = fs::remove_file(&probe);
@@ -197,7 +198,7 @@ pub const SEGMENTS_DELETED: &str = "the files of the shared memory in /dev/shm w
 /// exist.
 pub fn are_segments_deleted() -> bool {
     let prefix = fs::read_to_string(user_folder().join(PREFIX_FILE)).unwrap_or_default();
-    !prefix.is_empty() && entries_with(SEGMENTS, &prefix).next().is_none()
+    !prefix.is_empty() && entries_with(SEGMENT_FOLDER, &prefix).next().is_none()
 }
 
 /// Opens the file of the prefix with a shared lock, and reads it. The first participant chooses the prefix.
@@ -244,7 +245,7 @@ fn config(books: &Path, prefix: &str) -> Result<Config, PortError> {
 /// Chooses another prefix and removes the segments of the old one, unless a participant of this user lives.
 /// Another user may have seen the old prefix in `/dev/shm` and made files with future names.
 pub(super) fn renew_prefix() -> Result<(), PortError> {
-    let folder = open_user_folder()?;
+    let folder = make_user_folder()?;
     let path = folder.join(PREFIX_FILE);
     let failed = || port_error(format!("cannot renew {}", path.display()));
     let mut file = open_private(&path).map_err(failed())?;
@@ -283,7 +284,7 @@ fn has_participants(config: &Config) -> bool {
 
 /// Removes the segments of this user with a prefix.
 fn remove_segments(prefix: &str) {
-    for segment in entries_with(SEGMENTS, prefix) {
+    for segment in entries_with(SEGMENT_FOLDER, prefix) {
         // A segment of another user can stay, because nobody uses the prefix any more.
         let _ = fs::remove_file(segment);
     }
@@ -332,7 +333,7 @@ mod tests {
             // Root owns the folder, and only root may write in it.
             "/usr".into()
         };
-        assert_eq!(metadata(&foreign).unwrap().mode() & OTHERS_WRITE, 0);
+        assert_eq!(metadata(&foreign).unwrap().mode() & OTHERS_WRITE_MODE, 0);
         assert!(make_own(&foreign, USER_FOLDER).is_err());
     }
 }

@@ -14,7 +14,7 @@ use iceoryx2::node::{Node, NodeState, NodeView as _};
 use iceoryx2::prelude::*;
 
 use super::bus::PortError;
-use super::location::{Location, SEGMENTS, entries};
+use super::location::{Location, SEGMENT_FOLDER, entries};
 
 /// Folder of the nodes in iceoryx2's book-keeping: files and a folder of each, named after its number.
 const NODES: &str = "nodes";
@@ -71,7 +71,7 @@ impl Remains {
             let numbers = self.numbers(it);
             !numbers.is_empty() && numbers.is_disjoint(&nodes)
         });
-        let of_ports = entries(SEGMENTS).filter(|it| {
+        let of_ports = entries(SEGMENT_FOLDER).filter(|it| {
             let numbers = self.numbers(it);
             has_extension(it, &OF_PORTS) && !numbers.is_empty() && !numbers.is_subset(&ports)
         });

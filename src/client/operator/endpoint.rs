@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::connection::{Attempt, Connection, connect};
-use super::users::{group_name, is_trusted, user_name};
+use super::users::{group_name_or_id, is_trusted, user_name};
 use crate::messages::claim::{RECORD_EXTENSION, RunningDaemon, machines_in, running_daemon};
-use crate::messages::location::{OTHERS_WRITE, SYSTEM_FOLDER, daemon_folders, user_id};
+use crate::messages::location::{OTHERS_WRITE_MODE, SYSTEM_FOLDER, daemon_folders, user_id};
 
 /// Extensions of the socket for requests and of the read-only socket.
 const SOCKET_EXTENSION: &str = "sock";
@@ -52,7 +52,7 @@ impl Endpoint {
             machine: machine.into(),
             socket: socket_path(folder, machine),
             owner,
-            is_trusted: is_trusted(owner) && is_trusted(place.uid()) && place.mode() & OTHERS_WRITE == 0,
+            is_trusted: is_trusted(owner) && is_trusted(place.uid()) && place.mode() & OTHERS_WRITE_MODE == 0,
             daemon,
             folder: opened.clone(),
         })
@@ -95,7 +95,7 @@ impl Endpoint {
     pub fn allowed(&self) -> String {
         let group = fs::metadata(&self.socket).ok().filter(|found| found.mode() & 0o020 != 0);
         let owner = (self.owner != 0).then(|| format!("user {}", user_name(self.owner)));
-        let group = group.map(|found| format!("members of group {}", group_name(found.gid())));
+        let group = group.map(|found| format!("members of group {}", group_name_or_id(found.gid())));
         let users: Vec<_> = owner.into_iter().chain(group).chain(["root".into()]).collect();
         format!("only {} may; operator.group in the machine file names another group", users.join(" and "))
     }

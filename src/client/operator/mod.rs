@@ -62,7 +62,7 @@ pub enum OperatorError {
         /// The request.
         request: String,
         /// One of the daemons.
-        stranger: Stranger,
+        stranger: UntrustedDaemon,
     },
     /// The daemon refuses it.
     #[error("{request} was refused: {reason}", request = .0.name(), reason = .1)]
@@ -109,13 +109,13 @@ impl OperatorError {
 /// A daemon that does not count, and its answer.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("the daemon of user {owner} at {socket} does not count ({said})")]
-pub struct Stranger {
+pub struct UntrustedDaemon {
     owner: String,
     socket: String,
     said: String,
 }
 
-impl Stranger {
+impl UntrustedDaemon {
     fn at(endpoint: &Endpoint, connection: &Connection, said: &str) -> Self {
         let owner = connection.peer_user_id().unwrap_or(endpoint.owner);
         let socket = endpoint.socket.display().to_string();

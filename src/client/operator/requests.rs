@@ -10,7 +10,7 @@ use super::exchange::converse;
 use super::protocol::{AnswerLine, MAX_REQUEST_AGE_NS, RequestLine, RequestResult, STOPPED};
 use super::ride::{RideOrder, RidePhase};
 use super::status_report::StopNumber;
-use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
+use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, UntrustedDaemon};
 use hexad_core::control::signals::state::Request;
 
 /// Longest wait for the first line of the daemon: longer than the daemon waits for its loop.
@@ -62,7 +62,7 @@ fn attempt(
         let until = Instant::now() + FIRST_LINE_LIMIT;
         converse(connection, line, until, order.timeout, interrupted, &mut *waits)
     };
-    match ask_first(machine, ask) {
+    match query_first_trusted(machine, ask) {
         Ok(answer) => order.conclude(answer),
         Err(_) if interrupted() => Err(OperatorError::Interrupted),
         Err(OperatorError::NoAnswer(reason)) => Err(OperatorError::NotConfirmed(order.request, reason)),
@@ -93,11 +93,11 @@ pub fn post_for_cycle(machine: &str, request: Request, cycle_ns: u64) -> Result<
 
 /// The status of the daemon of a machine.
 pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
-    first_answer(machine, status_of)
+    first_answer(machine, request_status_from)
 }
 
 /// The same, for a source of setpoints that says something of its own input, and of its ride.
-pub fn status_for_source(
+pub fn request_status_as_source(
     machine: &str,
     input: Option<String>,
     ride: Option<RidePhase>,
@@ -107,7 +107,7 @@ pub fn status_for_source(
 }
 
 /// The status of the daemon that listens at an endpoint.
-pub fn status_of(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+pub fn request_status_from(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
     status_at(endpoint, &RequestLine::new("status"))
 }
 
@@ -128,7 +128,7 @@ pub fn ride(
 ) -> Result<AnswerLine, OperatorError> {
     let (stops, within_s) = (stop_number(machine), within.as_secs_f64());
     let line = RequestLine { stops, yes, within_s, progress: true, ..RequestLine::new(order.name()) };
-    let answer = ask_first(machine, |connection| {
+    let answer = query_first_trusted(machine, |connection| {
         converse(connection, &line, Instant::now() + FIRST_LINE_LIMIT, within, &interrupted, |_| ())
     });
     if interrupted() { Err(OperatorError::Interrupted) } else { answer }
@@ -137,7 +137,7 @@ pub fn ride(
 /// Requests a reload of the machine file. Returns the changes as text.
 pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError> {
     let line = RequestLine { progress: true, ..RequestLine::new("reload") };
-    let answer = ask_first(machine, |connection| {
+    let answer = query_first_trusted(machine, |connection| {
         converse(connection, &line, Instant::now() + FIRST_LINE_LIMIT, timeout, || false, |_| ())
     });
     match answer {
@@ -155,7 +155,7 @@ pub fn connect(machine: &str) -> Result<Connection, OperatorError> {
 }
 
 /// The answer of the first daemon that counts. `ask` sends a request over a connection.
-pub fn ask_first(
+pub fn query_first_trusted(
     machine: &str,
     mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
 ) -> Result<AnswerLine, OperatorError> {
@@ -193,7 +193,9 @@ fn ask_at<T>(
     for _ in 0..ATTEMPTS {
         match connect(endpoint) {
             Ok(Attempt::Connected(connection)) if !endpoint.counts(&connection) => {
-                return Err(Stranger::at(endpoint, &connection, "nothing was sent").error("the request"));
+                return Err(
+                    UntrustedDaemon::at(endpoint, &connection, "nothing was sent").error("the request")
+                );
             }
             Ok(Attempt::Connected(connection)) => match ask(connection) {
                 Ok(Some(answer)) => return Ok(answer),

@@ -13,7 +13,7 @@ use super::endpoint::{Endpoint, endpoints};
 use super::exchange::converse;
 use super::signal::{self, Process, Signalled};
 use super::users::user_name;
-use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
+use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, UntrustedDaemon};
 
 /// Longest wait for a connection and the first line of the daemon. After it the stop is sent by signal.
 const FIRST_LINE_LIMIT: Duration = Duration::from_millis(500);
@@ -46,7 +46,7 @@ enum Verdict {
     Absent,
     Forbidden,
     /// The daemon does not count.
-    NotTrusted(Stranger),
+    NotTrusted(UntrustedDaemon),
     Ended(Result<String, OperatorError>),
     /// Done by signal, and the way of confirmation.
     BySignal(String, String),
@@ -185,7 +185,7 @@ fn not_trusted(endpoint: &Endpoint, order: &Order, connection: &mut Connection, 
         Ok(Some(answer)) => format!("it says {:?}", answer.result.words()),
         _ => "it does not answer".into(),
     };
-    Verdict::NotTrusted(Stranger::at(endpoint, connection, &said))
+    Verdict::NotTrusted(UntrustedDaemon::at(endpoint, connection, &said))
 }
 
 /// Result of the stop of a machine, from the verdicts of its endpoints in their order; `None` if no process

@@ -17,7 +17,7 @@ pub fn user_name(user_id: u32) -> String {
 }
 
 /// Name of a group, or its number.
-pub fn group_name(group_id: u32) -> String {
+pub fn group_name_or_id(group_id: u32) -> String {
     let found = Group::from_gid(Gid::from_raw(group_id)).ok().flatten();
     found.map_or_else(|| group_id.to_string(), |group| group.name)
 }

@@ -17,7 +17,7 @@ thread_local! {
 pub struct CountingAllocator;
 
 /// Calls of this thread to allocate, grow or free, since it began.
-pub fn calls_of_this_thread() -> u64 {
+pub fn allocator_calls_of_this_thread() -> u64 {
     CALLS.with(Cell::get)
 }
 

@@ -23,7 +23,7 @@ use super::waiter::Waiter;
 use crate::messages::LoopCounters;
 
 /// Length of the queue of records to the log thread: 50 ms at 20 kHz, two periods of the log.
-pub const RECORDS: usize = 1024;
+pub const RECORD_QUEUE_LENGTH: usize = 1024;
 
 /// When cycles are released and which are late.
 #[derive(Clone, Copy, Debug)]
@@ -233,7 +233,7 @@ impl<C: Clock, T: CyclicTask> Cycles<'_, C, T> {
             // Those before the first cycle were not missed.
             let skipped = seen.map_or(0, |seen| handed.measurements.saturating_sub(seen + 1));
             seen = Some(handed.measurements);
-            let due_ns = if signalled { handed.handed_ns } else { timeout_at_ns };
+            let due_ns = if signalled { handed.written_ns } else { timeout_at_ns };
             // Without a message, the drive's clock is taken to have gone on as this one did.
             let release_ns =
                 measured_ns.unwrap_or_else(|| begin.release_ns + due_ns.saturating_sub(begin.due_ns));
@@ -263,7 +263,7 @@ impl<C: Clock, T: CyclicTask> Cycles<'_, C, T> {
         counters.cycles += 1;
         counters.late_wakeups += u64::from(waited && wakeup_ns > late_wakeup_ns);
         counters.caught_up += u64::from(!waited);
-        counters.allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
+        counters.allocations = ThreadUsage::allocator_calls_of_this_thread() - self.allocations;
         self.side.outputs.write(CycleOutput { due_ns, release_ns, output, counters: *counters });
         let done_ns = self.clock.now_ns();
         let (behind_ns, compute_ns) = (woke_ns.saturating_sub(due_ns), done_ns.saturating_sub(woke_ns));
@@ -281,8 +281,8 @@ pub fn is_overrun(behind_ns: u64, compute_ns: u64, period_ns: u64) -> bool {
     behind_ns < period_ns && behind_ns + compute_ns >= period_ns
 }
 
-/// False if the record is lost. A queue of another length than [`RECORDS`] takes nothing. There is none; but a
+/// False if the record is lost. A queue of another length than [`RECORD_QUEUE_LENGTH`] takes nothing. There is none; but a
 /// queue divides by its length, and this way the compiler sees that it is not zero.
 fn hand_over<T>(records: &mut Producer<'_, T>, record: T) -> bool {
-    records.capacity() == RECORDS - 1 && records.enqueue(record).is_ok()
+    records.capacity() == RECORD_QUEUE_LENGTH - 1 && records.enqueue(record).is_ok()
 }

@@ -14,7 +14,7 @@ pub struct CycleInput<I> {
     /// Number of measured messages received since start.
     pub measurements: u64,
     /// When the I/O thread wrote it \[ns\].
-    pub handed_ns: u64,
+    pub written_ns: u64,
 }
 
 /// Output of a cycle as the real-time thread writes it.

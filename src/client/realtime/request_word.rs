@@ -65,7 +65,7 @@ impl RequestWord {
         self.post_if(self.new_word(request, now_ns), || true)
     }
 
-    /// Posts a request, for a cycle in simulated time if it names one, unless `is_overruled`, which compares [`Self::posts_above`].
+    /// Posts a request, for a cycle in simulated time if it names one, unless `is_overruled`, which compares [`Self::posts_of_higher_precedence`].
     /// A stop that is counted before the word is exchanged prevents it.
     pub fn post_unless(
         &self,
@@ -108,7 +108,7 @@ impl RequestWord {
     }
 
     /// How many requests of higher precedence than this one were posted since the start, modulo 2^32.
-    pub fn posts_above(&self, request: u32) -> u32 {
+    pub fn posts_of_higher_precedence(&self, request: u32) -> u32 {
         let above = self.posts.iter().skip(request as usize + 1);
         above.fold(0, |sum, posts| sum.wrapping_add(posts.load(Ordering::SeqCst)))
     }
@@ -161,7 +161,7 @@ mod tests {
         word.set_seen(stop);
         assert_eq!((word.post(STOP, 6000), word.load()), (None, estop));
         word.set_seen(estop);
-        assert_eq!([1, STOP, ESTOP].map(|request| word.posts_above(request)), [3, 1, 0]);
+        assert_eq!([1, STOP, ESTOP].map(|request| word.posts_of_higher_precedence(request)), [3, 1, 0]);
         let again = word.post(1, 7000).unwrap();
         assert_eq!((word.load(), number(again)), (again, 1));
     }

@@ -1,6 +1,6 @@
 //! Resource usage of a thread, counted by the kernel and the allocator.
 
-use super::allocation::calls_of_this_thread;
+use super::allocation::allocator_calls_of_this_thread;
 
 /// Resource usage of one thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -19,8 +19,8 @@ pub struct ThreadUsage {
 
 impl ThreadUsage {
     /// Calls to the allocator alone: no system call.
-    pub fn allocations_of_this_thread() -> u64 {
-        calls_of_this_thread()
+    pub fn allocator_calls_of_this_thread() -> u64 {
+        allocator_calls_of_this_thread()
     }
 
     /// Usage of the calling thread since its start. A system call.
@@ -30,7 +30,7 @@ impl ThreadUsage {
         // SAFETY: `usage` is valid for the duration of the call. RUSAGE_THREAD cannot fail on Linux.
         unsafe { libc::getrusage(libc::RUSAGE_THREAD, &mut usage) };
         Self {
-            allocations: calls_of_this_thread(),
+            allocations: allocator_calls_of_this_thread(),
             minor_faults: usage.ru_minflt as u64,
             major_faults: usage.ru_majflt as u64,
             voluntary_switches: usage.ru_nvcsw as u64,

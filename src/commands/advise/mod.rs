@@ -88,7 +88,7 @@ fn advise(config: &Config, trajectory: Option<(&Path, &NumberTable)>) -> Result<
         singular: all.singular,
         peak_force_n: all.peak_n,
         peak_inside_n: inside.peak_n,
-        max_force_n: config.machine.actuator.available_force(),
+        max_force_n: config.machine.actuator.weakest_available_force_n(),
         tolerance,
         fidelities: rows.collect(),
         recommended: comparison.choice(tolerance).name(),

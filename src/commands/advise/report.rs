@@ -5,7 +5,7 @@ use core::fmt;
 use serde::Serialize;
 
 use hexad_core::model::fidelity::Fidelity;
-use hexad_machine::analysis::fidelity_choice::FidelityError;
+use hexad_machine::analysis::fidelity_choice::FidelityForceErrors;
 use hexad_machine::text::numbers::{percent, plain_percent, significant};
 use hexad_machine::text::text_table::{Left, Right, text_table};
 
@@ -57,7 +57,7 @@ fn by_name<S: serde::Serializer>(fidelity: &Fidelity, serializer: S) -> Result<S
 
 impl FidelityRow {
     /// Row of a fidelity. `peak` is the largest force of the motions inside.
-    pub fn new(error: &FidelityError, time_ns: f64, peak: f64, is_within_tolerance: bool) -> Self {
+    pub fn new(error: &FidelityForceErrors, time_ns: f64, peak: f64, is_within_tolerance: bool) -> Self {
         let ratio = |error: f64| if error == 0.0 { 0.0 } else { error / peak };
         Self {
             fidelity: error.fidelity,

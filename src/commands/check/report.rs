@@ -13,7 +13,7 @@ use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::assembly_modes::other_modes;
 use hexad_machine::analysis::clearance::Clearance;
 use hexad_machine::analysis::other_pose_search::OtherPoseSearch;
-use hexad_machine::config::control_loops::{ControlLoop, longest_age_s, loops};
+use hexad_machine::config::control_loops::{ControlLoop, longest_stable_age_s, loops};
 use hexad_machine::config::deployment::default_limits::{DerivedLimit, derived_limits};
 use hexad_machine::config::examination::Examination;
 use hexad_machine::config::{Config, Violation};
@@ -125,10 +125,10 @@ impl CheckReport {
         let others = other_modes(machine, &kinematic_state);
         let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
         let masses = &control.leg_masses;
-        let leg_modes_hz = [root(masses.softest_mode_gain), root(masses.stiffest_mode_gain)];
+        let leg_modes_hz = [root(masses.softest_mode_gain_ratio), root(masses.stiffest_mode_gain_ratio)];
         let constants =
             Constants::new(machine, hexad_daemon::parameters(machine, deployment, Fidelity::Exact));
-        let reachable = machine.within_margin(limits.stroke_margin_m);
+        let reachable = machine.with_stroke_margin(limits.stroke_margin_m);
         let clearance = Clearance::new(&reachable, constants.max_reference_condition);
         Self {
             schema: SCHEMA,
@@ -162,12 +162,12 @@ impl CheckReport {
             compensates_disturbances: control.compensate_disturbances,
             payload_change_kg: constants.disturbance_bounds.max_payload_change_kg,
             disturbance_step_m_s2: constants.disturbance_bounds.max_sudden_acceleration_m_s2,
-            available_force_n: machine.actuator.available_force(),
+            available_force_n: machine.actuator.weakest_available_force_n(),
             max_force_n: machine.actuator.max_force_n,
             friction_uncertainty_n: machine.actuator.friction_uncertainty_n,
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
-            stable_age_s: longest_age_s(deployment),
+            stable_age_s: longest_stable_age_s(deployment),
             held_pole_per_s: limits.held_pole_per_s,
         }
     }
@@ -187,7 +187,7 @@ fn legs(config: &Config) -> Vec<LegAtHome> {
         to_shortest_m: length_m - actuator.min_length_m,
         to_longest_m: actuator.max_length_m - length_m,
         force_n,
-        force_ratio: force_n.map(|force: f64| force.abs() / actuator.available_force()),
+        force_ratio: force_n.map(|force: f64| force.abs() / actuator.weakest_available_force_n()),
         joint_axis_deg,
     };
     values.map(leg).collect()

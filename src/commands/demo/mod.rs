@@ -15,7 +15,7 @@ use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
 use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, built_in_motion, duration};
 use super::failure::Failure;
-use super::progress::time_bar;
+use super::progress::millisecond_bar;
 use super::report::{self, recordings_in};
 use hexad_client::messages::{StatusMessage, Subscriber};
 use hexad_client::realtime::stop_request::Stop;
@@ -256,7 +256,7 @@ fn watch(
     stop: &Stop,
 ) -> Result<(), Failure> {
     let started = Instant::now();
-    let bar = time_bar(seconds + TYPICAL_OVERHEAD_S);
+    let bar = millisecond_bar(seconds + TYPICAL_OVERHEAD_S);
     loop {
         if stop.is_requested() {
             return Err(Failure::after_start("stopped by a signal"));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::recording::{Recording, desired_motion, measured_pose};
+use super::recording::{Recording, desired_motion, true_pose};
 use crate::commands::report::signals::{degrees, difference, rate_of_change};
 use crate::output::axis::{need_own_axes, range_of};
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
@@ -209,7 +209,7 @@ impl Signals {
         }
         for (message, desired) in recording.pairs() {
             let t = seconds(message.header.time_ns);
-            let error = measured_pose(message).displacement_to(&desired.motion().pose);
+            let error = true_pose(message).displacement_to(&desired.motion().pose);
             let [position, orientation] = tracking;
             position.push((t, error.linear.norm()));
             orientation.push((t, error.angular.norm()));

@@ -77,7 +77,7 @@ impl Recording {
         let at_rest = !self.pairs().any(|(_, desired)| moves(&desired));
         let mut sum = TrackingSum::default();
         for (measured, desired) in self.pairs().filter(|(_, desired)| at_rest || moves(desired)) {
-            let error = measured_pose(measured).displacement_to(&desired.motion().pose);
+            let error = true_pose(measured).displacement_to(&desired.motion().pose);
             sum.add(error.linear.norm(), error.angular.norm());
         }
         sum
@@ -104,7 +104,7 @@ fn with_desired<'a, T>(
 }
 
 /// True pose of the plant in a message.
-pub fn measured_pose(message: &MeasuredMessage) -> Pose {
+pub fn true_pose(message: &MeasuredMessage) -> Pose {
     TaskState::at_rest(message.x).motion().pose
 }
 

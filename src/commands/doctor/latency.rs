@@ -13,7 +13,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::files::HostFiles;
-use crate::commands::progress::time_bar;
+use crate::commands::progress::millisecond_bar;
 use hexad_client::messages::Times;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::realtime::clock::{Grid, Monotonic};
@@ -91,7 +91,7 @@ pub fn measure_all(
     seconds: f64,
     stop: &Stop,
 ) -> io::Result<Option<Vec<Latency>>> {
-    let (bar, start) = (time_bar(seconds), Instant::now());
+    let (bar, start) = (millisecond_bar(seconds), Instant::now());
     let mut all = vec![];
     let cpu = deployment.realtime.cpu;
     for plan in plans(deployment, seconds) {

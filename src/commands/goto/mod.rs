@@ -139,7 +139,7 @@ fn origin(config: &Config) -> (Observation, &'static str) {
     match status(&config.name).ok().and_then(|answer| Observation::of_answer(&answer, 0, &home)) {
         Some(seen) => (seen, "where the platform is"),
         None => (
-            Observation { reference_or_pose: Some(home), ..Observation::default() },
+            Observation { reference_or_measured_x: Some(home), ..Observation::default() },
             "home, as no daemon answers",
         ),
     }

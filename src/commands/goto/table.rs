@@ -118,7 +118,8 @@ impl Targets<'_> {
     fn check(&self, first: usize, seen: Observation, stop: &Stop) -> Result<f64, Failure> {
         let Self { arguments, config, path, coordinates, table } = self;
         let (constants, is_straight) = (constants(config), arguments.frames.tool.is_some());
-        let at = |x| Observation { reference_or_pose: Some(x), target: Some(x), ..Observation::default() };
+        let at =
+            |x| Observation { reference_or_measured_x: Some(x), target: Some(x), ..Observation::default() };
         let go_on = || !stop.is_requested();
         // After a target that cannot be reached only the next target is checked, as there is no way to it.
         let (mut from, mut duration_s) = (Some(seen), 0.0);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::quantities::{BODIES, LEG_QUANTITIES, Quantity};
+use super::quantities::{BODY_QUANTITIES, LEG_QUANTITIES, Quantity};
 use super::report::Delay;
 use crate::commands::machine_file::{Estimate, NewNumbers, NewValue, has_table};
 use hexad_core::model::LEGS;
@@ -50,7 +50,7 @@ pub(super) fn new_values(
         value: NewNumbers::Array((0..length).map(|k| estimate(&|machine| of(machine, k))).collect()),
     };
     // Neither combinations nor components of an array.
-    let numbers = BODIES.iter().filter(|quantity| !quantity.name.contains([' ', '[']));
+    let numbers = BODY_QUANTITIES.iter().filter(|quantity| !quantity.name.contains([' ', '[']));
     let number = |quantity: &Quantity| {
         one(quantity.name, &|machine: &Machine| (quantity.value)(machine, &machine.platform))
     };

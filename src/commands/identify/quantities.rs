@@ -18,7 +18,7 @@ const fn quantity(name: &'static str, unit: &'static str, value: fn(&Machine, &P
 }
 
 /// Of the platform, the links and all drives.
-pub(super) const BODIES: [Quantity; 18] = [
+pub(super) const BODY_QUANTITIES: [Quantity; 18] = [
     quantity("platform.mass_kg", "kg", |machine, _| machine.platform.mass_kg),
     quantity("platform with six rods", "kg", |machine, _| {
         machine.platform.mass_kg + LEGS as f64 * machine.rod.mass_kg

@@ -4,14 +4,14 @@ use core::fmt;
 
 use serde::Serialize;
 
-use super::quantities::{BODIES, LEG_QUANTITIES, PAYLOAD, Quantity, base_parameter};
+use super::quantities::{BODY_QUANTITIES, LEG_QUANTITIES, PAYLOAD, Quantity, base_parameter};
 use super::verdict::Verdict;
 use crate::commands::report::summary::Fact;
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::{Machine, Platform};
 use hexad_machine::analysis::drive_delay::DriveDelay;
 use hexad_machine::analysis::identification::{
-    Estimated, Identification, Load, Run, errors_by_period, prediction_errors,
+    Estimated, Identification, Load, Run, prediction_errors, repeated_and_changing_errors,
 };
 use hexad_machine::config::Config;
 use hexad_machine::text::numbers::significant;
@@ -157,7 +157,8 @@ impl IdentificationReport {
         let holds_machine = runs.iter().all(|run| run.load == Load::Payload);
         let row =
             |quantity: &Quantity| Row::new(quantity.name, quantity.unit, &found.estimate(quantity.value));
-        let mut quantities: Vec<_> = if holds_machine { vec![] } else { BODIES.iter().map(row).collect() };
+        let mut quantities: Vec<_> =
+            if holds_machine { vec![] } else { BODY_QUANTITIES.iter().map(row).collect() };
         if has_payload {
             quantities.extend(PAYLOAD.iter().map(row));
         }
@@ -169,7 +170,7 @@ impl IdentificationReport {
             };
             LEG_QUANTITIES.iter().map(|(name, unit, of)| Row::new(name, unit, &of_leg(*of))).collect()
         };
-        let after_by_period = errors_by_period(&found.machine, &predicted(runs, &[]));
+        let after_by_period = repeated_and_changing_errors(&found.machine, &predicted(runs, &[]));
         let predicted = predicted(runs, validation);
         Self {
             schema: SCHEMA,

@@ -42,12 +42,13 @@ mod tests {
             let from = home + Vector6::new(0.08, -0.1, 0.09, 0.06, 0.05, -0.04);
             let precheck = Precheck::new(&config);
             let refused = |share: f64| {
-                let duration_s = share * unhurried_approach_s(&config.deployment.limits.reference, &from, &home);
+                let duration_s =
+                    share * unhurried_approach_s(&config.deployment.limits.reference, &from, &home);
                 let timeline =
                     Timeline::new(&config.machine, &from, &home, 1.0).with_shortest_approach(duration_s);
                 let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));
                 // In one piece, because a new start would hide any lag of the reference.
-                precheck.refusal(at, [0.0, timeline.motion_start()])
+                precheck.refusal(at, [0.0, timeline.motion_start_s()])
             };
             assert!(refused(1.0).is_none(), "{tight}: {:?}", refused(1.0));
             assert!(refused(0.25).is_some(), "{tight}");

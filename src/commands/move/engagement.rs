@@ -53,7 +53,7 @@ impl Engagement {
 
     /// Control has begun; if it ends, the time in step with the setpoints begins again. A request over the socket that was not
     /// necessary is not sent later: the daemon may have been restarted, and an operator must engage.
-    pub fn has_succeeded(&mut self) {
+    pub fn note_control_begun(&mut self) {
         match self {
             Self::InStep { began_ns, .. } => *began_ns = None,
             Self::Socket { result: None, .. } => *self = Self::None,

@@ -13,11 +13,11 @@ use hexad_core::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad_core::control::signals::limits::Limits;
 use hexad_core::control::signals::state::State;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::timeline::Timeline;
 use hexad_daemon::rate_change::RateChange;
-use hexad_daemon::target_source::held_x;
+use hexad_daemon::target_source::request_held_x;
 use hexad_machine::config::Config;
 
 /// Time without a status of a daemon in control, after which the approach starts again \[ns\].
@@ -108,8 +108,8 @@ impl<'a> Playback<'a> {
     /// Whether the source may join, else the reason. In lock-step the daemon follows a source from its first message on, so that a
     /// platform that is held can be taken over only before it.
     pub fn may_join(&mut self) -> Result<(), String> {
-        let held =
-            held_x(self.config).inspect_err(|reason| self.log_reason(&format!("waiting: {reason}")))?;
+        let held = request_held_x(self.config)
+            .inspect_err(|reason| self.log_reason(&format!("waiting: {reason}")))?;
         self.phase = held.map_or(Phase::Waiting, |x| Phase::Standing(self.timeline(&x.into())));
         Ok(())
     }
@@ -175,7 +175,7 @@ impl<'a> Playback<'a> {
     }
 
     fn slowing(&self, path: Path, since_ns: u64, now_ns: u64) -> Phase {
-        let t = seconds_since(since_ns, now_ns);
+        let t = seconds_since_or_0(since_ns, now_ns);
         let slowdown = RateChange::to_rest(t, &self.limits, |t| path.at(t, self.trajectory));
         let then = if self.is_ending { "once more ends at once" } else { "hexad move --resume goes on" };
         info!("slowing down along the path, within {:.1} s; {then}", slowdown.duration_s);
@@ -201,7 +201,7 @@ impl<'a> Playback<'a> {
     fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), Failure> {
         if let (Phase::Standing(timeline), State::Active) = (&self.phase, state) {
             info!("the daemon is in control: moving");
-            self.engagement.has_succeeded();
+            self.engagement.note_control_begun();
             let path = Path::new(*timeline);
             (self.phase, self.last_active_ns) = (Phase::Playing(path, now_ns), now_ns);
             return Ok(());
@@ -279,7 +279,7 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Playing(path, since_ns) => {
-                let t = seconds_since(*since_ns, now_ns);
+                let t = seconds_since_or_0(*since_ns, now_ns);
                 let task = path.at(t, self.trajectory);
                 match path.has_ended(t) {
                     true if self.is_to_hold => self.phase = Phase::Holding(task, now_ns),
@@ -289,7 +289,7 @@ impl<'a> Playback<'a> {
                 motion(task)
             }
             Phase::Slowing(path, slowdown, since_ns) => {
-                let since_s = seconds_since(*since_ns, now_ns);
+                let since_s = seconds_since_or_0(*since_ns, now_ns);
                 let task = slowdown.at(since_s, |t| path.at(t, self.trajectory));
                 if slowdown.has_ended(since_s) {
                     self.phase = if self.is_ending {
@@ -334,7 +334,7 @@ impl<'a> Playback<'a> {
                     return Ok(());
                 }
                 self.next_inquiry_ns = now_ns + INQUIRY_INTERVAL_NS;
-                match held_x(self.config) {
+                match request_held_x(self.config) {
                     Ok(Some(x)) => {
                         self.phase = Phase::Standing(self.timeline(&x.into()));
                         return Ok(());

@@ -8,7 +8,7 @@ use tracing::info;
 use crate::commands::failure::Failure;
 use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::commands::orientation::OrientationFormat;
-use crate::commands::progress::time_bar;
+use crate::commands::progress::millisecond_bar;
 use hexad_core::model::task::TaskState;
 use hexad_core::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad_core::motion::excitation::Excitation;
@@ -115,7 +115,7 @@ impl Trajectory {
         };
         let mut errors = TableErrors::new(path);
         let mut reported = None;
-        let bar = time_bar(last - first).with_message("checking the whole motion");
+        let bar = millisecond_bar(last - first).with_message("checking the whole motion");
         precheck.follow(
             |t| self.at(t - first),
             [first, last],

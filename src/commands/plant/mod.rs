@@ -54,7 +54,7 @@ pub fn run_on_bus(config: &Config, stop: &Stop) -> Result<(), Failure> {
         )));
     }
     let run = if bus.is_simulated() { run_in_lockstep } else { run_in_real_time };
-    Ok(run_on_bus(config, &bus, stop)?)
+    Ok(run(config, &bus, stop)?)
 }
 
 fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::history::History;
 use super::run::Run;
-use crate::output::axis::{exponent_of, prefixed};
+use crate::output::axis::{displayed_exponent, prefixed};
 use hexad_client::messages::Times;
 use hexad_machine::config::Config;
 
@@ -211,7 +211,7 @@ fn thousands(number: u64) -> String {
 /// Quantity with three digits and the prefix of its unit.
 fn scaled(value: f64, unit: &str) -> String {
     let label = format!("[{unit}]");
-    let exponent = exponent_of(&label, value);
+    let exponent = displayed_exponent(&label, value);
     let number = value / 10f64.powi(exponent);
     let digits = if number >= 100.0 {
         0

@@ -4,7 +4,7 @@ use crate::commands::failure::Failure;
 use hexad_client::operator::OperatorError;
 use hexad_client::operator::endpoint::{Endpoint, endpoints};
 use hexad_client::operator::protocol::{AnswerLine, RequestResult, VERSION};
-use hexad_client::operator::requests::status_of;
+use hexad_client::operator::requests::request_status_from;
 use hexad_client::operator::status_report::StatusReport;
 use hexad_client::operator::users::user_name;
 use hexad_machine::text::files::print;
@@ -37,7 +37,7 @@ pub fn show(is_json: bool) -> Result<(), Failure> {
 
 /// The daemon's answer, or an answer with the reason why there is none. `None` if no process listens.
 fn answer(endpoint: &Endpoint) -> Option<AnswerLine> {
-    let error = match status_of(endpoint) {
+    let error = match request_status_from(endpoint) {
         Ok(answer) => return Some(answer),
         Err(OperatorError::NoDaemon(_)) => return None,
         Err(error) => error,

@@ -8,7 +8,7 @@ use plotters::style::text_anchor::HPos;
 use super::bands::{MAX_BANDS, Quantity, distinct_texts};
 use super::map_content::{LegendSample, MapLine, in_unit};
 use super::slice::Slice;
-use crate::output::axis::{Axis, exponent_of, prefixed};
+use crate::output::axis::{Axis, displayed_exponent, prefixed};
 use crate::output::svg::{
     Area, ChartError, DrawError, GRID, LABEL_SIZE, MARGIN, SAMPLE, TITLE_HEIGHT, UNIT, X_LABELS, Y_LABELS,
     draw_title, fitted_text, house_style, legend_rows, rgb, text, write_picture,
@@ -77,7 +77,7 @@ impl MapDrawing<'_> {
         let (width, height) = area.dim_in_pixel();
         let middle = (MARGIN + Y_LABELS + width as i32 - right) / 2;
         let thresholds = quantity.thresholds(slice.qualities.iter().filter(|quality| quality.within_reach()));
-        let exponent = exponent_of(quantity.label, thresholds.iter().copied().fold(0.0, f64::max));
+        let exponent = displayed_exponent(quantity.label, thresholds.iter().copied().fold(0.0, f64::max));
         let title = prefixed(quantity.label, exponent);
         let label = fitted_text(&[(&title, width as i32)], 13, HPos::Center);
         area.draw_text(&title, &label, (middle, TITLE_HEIGHT * 3 / 5))?;

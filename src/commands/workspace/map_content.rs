@@ -28,7 +28,7 @@ pub(super) type MapLine = (LegendSample, Vec<(f64, f64)>);
 impl MapDrawing<'_> {
     /// The four quantities of the maps.
     pub(super) fn quantities(&self, slice: &Slice) -> [Quantity; 4] {
-        let max_force = self.machine.actuator.available_force();
+        let max_force = self.machine.actuator.weakest_available_force_n();
         let reached = || slice.qualities.iter().filter(|quality| quality.within_reach());
         // If every pose needs more force than the actuators have, the map still shows how much.
         let is_possible = reached().any(|quality| quality.worst_force_n <= max_force);

@@ -128,7 +128,7 @@ impl WorkspaceReport {
     /// Evaluates the slices, searches the regions, writes the files.
     pub fn new(config: &Config, query: &WorkspaceQuery) -> Result<Self, WorkspaceError> {
         let Config { name, machine, deployment, .. } = config;
-        let reachable = machine.within_margin(deployment.limits.stroke_margin_m);
+        let reachable = machine.with_stroke_margin(deployment.limits.stroke_margin_m);
         let home = KinematicState::new(machine, machine.home_pose());
         let largest_condition = max_reference_condition(&home, deployment.limits.condition);
         let clearance = Clearance::new(&reachable, largest_condition);
@@ -156,7 +156,7 @@ impl WorkspaceReport {
             acceleration_m_s2: effort.linear_m_s2,
             angular_acceleration_rad_s2: effort.angular_rad_s2,
             condition_limit: largest_condition,
-            max_force_n: machine.actuator.available_force(),
+            max_force_n: machine.actuator.weakest_available_force_n(),
             slices,
             regions: region_reports(regions, query.turn.to_degrees(), envelope.is_some(), largest_condition),
             largest_box: BoxRange::all(&shape, regions[2].guaranteed),
@@ -164,7 +164,7 @@ impl WorkspaceReport {
             hint: None,
             files,
         };
-        Ok(Self { hint: report.payload_hint(machine), ..report })
+        Ok(Self { hint: report.no_payload_reason(machine), ..report })
     }
 }
 

@@ -177,7 +177,7 @@ impl BoxRange {
 
 impl WorkspaceReport {
     /// Reason why no usable pose carries a payload, with the limit that requires most of the force.
-    pub fn payload_hint(&self, machine: &Machine) -> Option<String> {
+    pub fn no_payload_reason(&self, machine: &Machine) -> Option<String> {
         let has_none = |slice: &SliceReport| slice.usable > 0 && slice.payload_kg == [0.0; 2];
         if !self.slices.iter().any(has_none) {
             return None;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::clearance::Clearance;
-use hexad_machine::analysis::other_pose_search::{nearest_permitted, search_density};
+use hexad_machine::analysis::other_pose_search::{nearest_permitted, relative_search_density};
 use hexad_machine::analysis::pose_quality::{PoseEvaluator, PoseQuality};
 use hexad_machine::text::csv_table::coordinates;
 use hexad_machine::text::csv_writer::CsvWriter;
@@ -112,7 +112,7 @@ impl Slice {
 
     /// The same with a search of its usable poses for other permitted poses with the same lengths.
     pub fn with_other_poses(mut self, machine: &Machine, clearance: &Clearance) -> Self {
-        let most = MAX_SEARCHED_POSES * search_density(machine);
+        let most = MAX_SEARCHED_POSES * relative_search_density(machine);
         self.search_step = (self.count as f64 / most).ceil() as usize;
         let indices = || (0..self.count).step_by(self.search_step);
         let pose = |places: &[usize; 2]| TaskState::at_rest(self.x(*places)).motion().pose;

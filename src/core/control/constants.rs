@@ -84,7 +84,7 @@ impl Constants {
         let least_missing = least_missing_force_acceleration(
             &by_force,
             angle_weighting_radius_m,
-            machine.actuator.available_force(),
+            machine.actuator.weakest_available_force_n(),
         );
         let least_missing_acceleration_squared =
             if mode.includes_inertia() { least_missing * least_missing } else { f64::INFINITY };

@@ -9,7 +9,7 @@ use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::estimator::covariance::NoiseModel;
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::Limits;
-use crate::control::signals::limits::largest_ratio;
+use crate::control::signals::limits::largest_ratio_or_nan;
 use crate::control::signals::state::AfterStop;
 use crate::model::fidelity::Fidelity;
 
@@ -101,7 +101,7 @@ impl Parameters {
     pub fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
         let Self { law, engage_position_m, engage_orientation_rad, .. } = self;
         let PoseError { pose, twist } = error;
-        largest_ratio([
+        largest_ratio_or_nan([
             pose.linear.norm() / engage_position_m,
             pose.angular.norm() / engage_orientation_rad,
             twist.linear.norm() / (law.position.kp_per_s2.sqrt() * engage_position_m),

@@ -109,7 +109,7 @@ pub struct Joints {
 
 impl Machine {
     /// Machine whose stroke is shorter at both ends by a margin \[m\].
-    pub fn within_margin(&self, margin_m: f64) -> Self {
+    pub fn with_stroke_margin(&self, margin_m: f64) -> Self {
         let mut machine = self.clone();
         machine.actuator.min_length_m += margin_m;
         machine.actuator.max_length_m -= margin_m;
@@ -256,14 +256,14 @@ impl Actuator {
 
     /// Force that every leg can get, whichever way it moves \[N\]: that of the weakest drive, less load friction. A
     /// machine is as strong as its weakest leg; the others differ by a few percent.
-    pub fn available_force(&self) -> f64 {
+    pub fn weakest_available_force_n(&self) -> f64 {
         let share = |(scale, load_friction): (&f64, &f64)| scale * (1.0 - load_friction);
         self.max_force_n
             * self.force_scale.iter().zip(&self.load_friction_share).map(share).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether legs get other forces than their drives are told.
-    pub fn transmits_otherwise(&self) -> bool {
+    pub fn has_load_friction_or_scale(&self) -> bool {
         self.force_scale != [1.0; LEGS] || self.load_friction_share != [0.0; LEGS]
     }
 

@@ -22,7 +22,7 @@ use super::machine::Joints;
 
 /// Largest Frobenius norm of N: the root of 12, from six directions and six arms whose mean square is 1. No
 /// moment exceeds its arm.
-pub const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_755;
+pub const MAX_LEG_WRENCHES_NORM: f64 = 3.464_101_615_137_755;
 
 /// Explanation of the condition in reports.
 pub const CONDITION_MEANING: &str = "6 is best; errors and forces grow with it";

@@ -38,7 +38,7 @@ pub struct Transmission {
 impl Transmission {
     /// Ratios for rates of the legs \[m/s\].
     pub fn new(actuator: &Actuator, rates_m_s: &[f64; LEGS]) -> Self {
-        if !actuator.transmits_otherwise() {
+        if !actuator.has_load_friction_or_scale() {
             return Self { ratios: None };
         }
         let mut ratios = [actuator.force_scale; 2];
@@ -54,7 +54,7 @@ impl Transmission {
 
     /// Ratios for a motion of the platform.
     pub fn of_motion(machine: &Machine, motion: &Motion) -> Self {
-        if !machine.actuator.transmits_otherwise() {
+        if !machine.actuator.has_load_friction_or_scale() {
             return Self { ratios: None };
         }
         let (_, rates) = leg_lengths_and_rates(machine, &motion.pose, &motion.twist);

@@ -205,5 +205,5 @@ pub fn keeps_reserve(model: &InverseDynamics, state: &TaskState) -> bool {
         && legs.rate_m_s.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate_m_s)
         && model
             .forces::<Exact>(&motion)
-            .is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.available_force()))
+            .is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.weakest_available_force_n()))
 }

@@ -65,7 +65,7 @@ impl FourierSeries {
 /// let mut series = FourierSeries::default();
 /// series.0[(5, 5)] = 0.1;
 /// let excitation = Excitation::new(&machine, series, 3, fit(&machine, BuiltInMotion::Sines, 10.0));
-/// assert_eq!((excitation.counted_periods(), excitation.duration()), ([2.0, 32.0], 44.0));
+/// assert_eq!((excitation.counted_interval_s(), excitation.duration()), ([2.0, 32.0], 44.0));
 /// assert_eq!(excitation.at(0.0).x, nalgebra::Vector6::from(machine.home));
 /// assert!((excitation.at(5.0).x - excitation.at(25.0).x).norm() < 1e-14);
 /// ```
@@ -94,7 +94,7 @@ impl Excitation {
     }
 
     /// Beginning and end of the counted periods \[s\].
-    pub fn counted_periods(&self) -> [f64; 2] {
+    pub fn counted_interval_s(&self) -> [f64; 2] {
         [BLEND_S, BLEND_S + f64::from(self.periods) * PERIOD_S]
     }
 
@@ -121,7 +121,7 @@ impl Excitation {
 
     /// End of the periodic part \[s\].
     fn blended_out(&self) -> f64 {
-        let [_, end] = self.counted_periods();
+        let [_, end] = self.counted_interval_s();
         end + BLEND_S
     }
 }

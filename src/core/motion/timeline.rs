@@ -28,8 +28,8 @@ const APPROACH_RATE_SHARE: f64 = 0.2;
 /// let above = TaskState { x: home.x + nalgebra::Vector6::ith(5, 0.05), ..home };
 /// let timeline = Timeline::new(&machine, &home.x, &above.x, 4.0);
 /// assert_eq!(timeline.at(0.0, |_| above), home);
-/// assert!((timeline.at(timeline.motion_start() - 1e-6, |_| above).x - above.x).amax() < 1e-9);
-/// assert_eq!(timeline.end(), timeline.motion_start() + 4.0 + 0.5);
+/// assert!((timeline.at(timeline.motion_start_s() - 1e-6, |_| above).x - above.x).amax() < 1e-9);
+/// assert_eq!(timeline.end(), timeline.motion_start_s() + 4.0 + 0.5);
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Timeline {
@@ -57,19 +57,19 @@ impl Timeline {
     }
 
     /// Start of the motion itself \[s\].
-    pub fn motion_start(&self) -> f64 {
+    pub fn motion_start_s(&self) -> f64 {
         2.0 * SETTLE_S + self.approach_s
     }
 
     /// End of the last standstill \[s\].
     pub fn end(&self) -> f64 {
-        self.motion_start() + self.motion_s + SETTLE_S
+        self.motion_start_s() + self.motion_s + SETTLE_S
     }
 
     /// X, X', X'' at `t_s`, given the motion as a function of its own time, which is evaluated only within
     /// \[0, duration\].
     pub fn at(&self, t_s: f64, motion: impl FnOnce(f64) -> TaskState) -> TaskState {
-        let motion_time = t_s - self.motion_start();
+        let motion_time = t_s - self.motion_start_s();
         if motion_time < 0.0 {
             return straight_move(&self.from, &self.to, &rise(t_s - SETTLE_S, self.approach_s));
         }

@@ -78,7 +78,7 @@ impl ForwardDynamics {
 
     /// Smallest moving mass an actuator can feel \[kg\]: 1 / largest eigenvalue of `N^T M^-1 N`. It bounds
     /// how fast friction can act, hence the step of the integrator.
-    pub fn smallest_leg_mass(&self, pose: &Pose) -> Option<f64> {
+    pub fn smallest_effective_leg_mass_kg(&self, pose: &Pose) -> Option<f64> {
         let mobility = self.mass.leg_mobility(pose)?;
         // The search for eigenvalues squares, and does not end where that overflows.
         let is_valid = mobility.iter().all(|element| element.abs() < MAX_MOBILITY);

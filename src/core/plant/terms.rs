@@ -57,7 +57,9 @@ impl PlantTerms {
     pub fn choose(machine: &Machine, wanted: &Imperfections, longest_step_s: f64, tolerance_m: f64) -> Self {
         let actuator = &machine.actuator;
         let least_mass = |machine: &Machine| {
-            ForwardDynamics::new(machine).smallest_leg_mass(&machine.home_pose()).unwrap_or(f64::NAN)
+            ForwardDynamics::new(machine)
+                .smallest_effective_leg_mass_kg(&machine.home_pose())
+                .unwrap_or(f64::NAN)
         };
         let dry =
             wanted.friction.dry() + actuator.largest_coulomb_friction() + held_by_load_friction(machine);
@@ -149,7 +151,7 @@ impl PlantTerms {
                 *accelerates = (*force - friction.force(*drive_rate, self.smoothing) - tension) / drive_mass;
                 *force = tension;
             }
-        } else if actuator.transmits_otherwise() || self.friction.iter().any(Friction::any) {
+        } else if actuator.has_load_friction_or_scale() || self.friction.iter().any(Friction::any) {
             let rates = legs(dynamics.machine(), state).rate_m_s;
             force = Transmission::new(actuator, &rates).leg_forces(push_n);
             for ((force, friction), rate) in force.iter_mut().zip(&self.friction).zip(rates) {

@@ -10,7 +10,7 @@ use std::process;
 use nix::unistd;
 
 use hexad_client::messages::PortError;
-use hexad_client::messages::location::{SYSTEM_FOLDER, open_user_folder};
+use hexad_client::messages::location::{SYSTEM_FOLDER, make_user_folder};
 use hexad_client::operator::endpoint::{reading_path, socket_path};
 use hexad_machine::config::deployment::OperatorAccess;
 
@@ -98,7 +98,7 @@ pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, Soc
             result => return result,
         }
     }
-    in_folder(&open_user_folder()?)
+    in_folder(&make_user_folder()?)
 }
 
 /// Group named by a key of the configuration.

@@ -9,7 +9,7 @@ use tracing::debug;
 
 use super::answer::OpenRequest;
 use super::connection::Connection;
-use super::order::{Order, PendingOrder, REPLACED, Step, stop_count};
+use super::order::{Order, PendingOrder, REPLACED, Step, overruling_count};
 use super::{MAX_WITHIN_S, Server, name_poses};
 use crate::motion_requests::job::{End, Job, Jog, MotionEvent, MotionInput};
 use crate::motion_requests::order::{MotionKind, MotionOrder};
@@ -31,7 +31,7 @@ pub struct Motions {
 pub(super) struct Running {
     request: String,
     unanswered: Option<OpenRequest>,
-    /// [`stop_count`] when it was asked for: after a stop it takes no control.
+    /// [`overruling_count`] when it was asked for: after a stop it takes no control.
     stops_before: u32,
     /// Whether it is planned.
     has_begun: bool,
@@ -79,7 +79,7 @@ impl Running {
 
     /// Whether it is to begin, and a stop came after it was asked for.
     fn is_stopped(&self, word: &RequestWord) -> bool {
-        !self.has_begun && self.stops_before != stop_count(word, Request::Engage)
+        !self.has_begun && self.stops_before != overruling_count(word, Request::Engage)
     }
 
     fn end(&self, end: End) {
@@ -97,7 +97,7 @@ impl Server<'_> {
         line: &RequestLine,
         snapshot: &Snapshot,
     ) -> bool {
-        let stops_before = stop_count(self.links.word, Request::Engage);
+        let stops_before = overruling_count(self.links.word, Request::Engage);
         let order = match MotionOrder::of_line(line, &self.status.loaded().config) {
             Ok(order) => order,
             Err(reason) => return connection.answer(request, AnswerLine::invalid(reason)),

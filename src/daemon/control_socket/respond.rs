@@ -6,7 +6,7 @@ use tracing::debug;
 
 use super::answer::OpenRequest;
 use super::connection::Connection;
-use super::order::{Order, PendingOrder, stop_count};
+use super::order::{Order, PendingOrder, overruling_count};
 use super::pending_file::{PendingFile, RECORD};
 use super::reload::RELOAD;
 use super::ride::PendingRide;
@@ -87,7 +87,7 @@ impl Server<'_> {
         line: &RequestLine,
         snapshot: &Snapshot,
     ) -> bool {
-        let stops_before = stop_count(self.links.word, of_controller);
+        let stops_before = overruling_count(self.links.word, of_controller);
         let refusal = if of_controller.can_begin_control() { self.refusal(line, snapshot) } else { None };
         let refusal = refusal.or_else(|| self.refused_pose(line, snapshot));
         let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
@@ -234,7 +234,7 @@ impl Server<'_> {
 
     /// The number of stops so far.
     pub(super) fn stops(&self) -> StopNumber {
-        StopNumber { daemon: self.began_us, count: stop_count(self.links.word, Request::Engage) }
+        StopNumber { daemon: self.began_us, count: overruling_count(self.links.word, Request::Engage) }
     }
 
     /// Answer to a request that would begin control or motion, if the daemon ends, if the request may be old, or if a stop came after

@@ -23,7 +23,7 @@ use hexad_client::operator::users::user_name;
 use hexad_core::control::signals::inputs::{Publishers, SetpointKind};
 use hexad_core::control::signals::limits::{Limit, LimitSet};
 use hexad_core::control::signals::state::State;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::LEGS;
 use hexad_machine::config::Config;
 use hexad_machine::text::excerpt::excerpt_of_length;
@@ -120,8 +120,8 @@ impl StatusSource {
     }
 
     /// Notes the processes whose measurements arrive.
-    pub fn note_drivers(&mut self, Publishers { used_pid, ignored_pid }: Publishers) {
-        self.drivers.extend([used_pid, ignored_pid].into_iter().filter(|process_id| *process_id != 0));
+    pub fn note_drivers(&mut self, Publishers { used_pid, ignored_pid_or_0 }: Publishers) {
+        self.drivers.extend([used_pid, ignored_pid_or_0].into_iter().filter(|process_id| *process_id != 0));
     }
 
     /// The processes that have published measurements, may do so again, and live, silent or not.
@@ -191,7 +191,7 @@ impl StatusSource {
                 loaded_unix_s: loaded.loaded_unix_s,
                 reloads: self.reloads,
             },
-            age_s: (snapshot.time_ns > 0).then(|| seconds_since(snapshot.time_ns, now_ns)),
+            age_s: (snapshot.time_ns > 0).then(|| seconds_since_or_0(snapshot.time_ns, now_ns)),
             limits_scale: deployment.limits.scale,
             active_limits: limits.map(|limit| limit.name().into()).collect(),
             timing: timing(snapshot, deployment.realtime.rate_hz),
@@ -236,7 +236,7 @@ impl StatusSource {
                       processes: Option<Vec<u32>>,
                       rejection: Option<Rejection>| SourceReport {
             topic: topic.into(),
-            age_s: time_ns.map(|time_ns| seconds_since(time_ns, now_ns)),
+            age_s: time_ns.map(|time_ns| seconds_since_or_0(time_ns, now_ns)),
             processes: processes
                 .into_iter()
                 .flatten()
@@ -279,7 +279,8 @@ fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
 /// The legs. Rates that are older than the timeout are of the past, as of a driver that has ended in motion.
 fn legs(snapshot: &Snapshot, now_ns: u64, timeout_s: f64) -> Vec<LegReport> {
     let Some(measurement) = &snapshot.measurement else { return vec![] };
-    let is_new = snapshot.status.pose_valid == 1 || seconds_since(measurement.time_ns, now_ns) < timeout_s;
+    let is_new =
+        snapshot.status.pose_valid == 1 || seconds_since_or_0(measurement.time_ns, now_ns) < timeout_s;
     let rates = measurement.rate_m_s.filter(|_| is_new).map_or([None; LEGS], |rate| rate.map(Some));
     let numbers = measurement.length_m.iter().zip(rates).zip(&snapshot.command_n).take(LEGS);
     numbers
@@ -302,7 +303,7 @@ fn process_report(
         process_id,
         command: command(process_id),
         user: user.unwrap_or_default(),
-        is_ignored: publisher == publishers.ignored_pid,
+        is_ignored: publisher == publishers.ignored_pid_or_0,
         is_stopped: is_stopped(process_id),
         input,
         ride,

@@ -36,7 +36,7 @@ impl Inputs {
 
     /// The input for the next cycle.
     pub fn cycle_input(&mut self) -> CycleInput {
-        self.cycle.handed_ns = monotonic_ns();
+        self.cycle.written_ns = monotonic_ns();
         self.cycle
     }
 
@@ -72,7 +72,7 @@ impl Inputs {
     }
 
     /// Whether the setpoint of an instant has arrived, or none can arrive because the source has left.
-    pub fn has_setpoint_of(&mut self, time_ns: u64, has_control: bool) -> bool {
+    pub fn receive_setpoint_of(&mut self, time_ns: u64, has_control: bool) -> bool {
         // In this order, because the source sends its last message before it leaves.
         let has_left = self.setpoints.subscriber().accepted_or_lost_count() > 0
             && self.setpoints.subscriber().publisher_count() == 0;

@@ -23,7 +23,7 @@ use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::lockstep::poll_until;
 use hexad_client::messages::{Bus, IoCounters, PortError, RejectionCounts, StatisticsMessage};
 use hexad_client::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
-use hexad_client::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
+use hexad_client::realtime::cyclic::{RECORD_QUEUE_LENGTH, ReleaseMode, Timing};
 use hexad_client::realtime::request_word::RequestWord;
 use hexad_client::realtime::triple_buffer::{Reader, Writer};
 use hexad_client::realtime::usage::ThreadUsage;
@@ -213,7 +213,7 @@ impl IoThread<'_> {
             answered_ns = Some(time_ns);
             self.inputs.set_measurement(measurement);
             let setpoint = poll_until(&is_stopped, || {
-                self.inputs.has_setpoint_of(time_ns, self.has_control).then_some(())
+                self.inputs.receive_setpoint_of(time_ns, self.has_control).then_some(())
             });
             if setpoint.is_none() {
                 return;
@@ -224,7 +224,7 @@ impl IoThread<'_> {
             poll_until(&is_stopped, || {
                 self.publish_if_new();
                 let waiting = self.published.saturating_sub(self.links.passed_on.load(Ordering::Relaxed));
-                let has_room = waiting < RECORDS as u64 / 2 && !self.links.gate.is_searching();
+                let has_room = waiting < RECORD_QUEUE_LENGTH as u64 / 2 && !self.links.gate.is_searching();
                 (self.published > before && has_room).then_some(())
             });
         }
@@ -258,7 +258,7 @@ impl IoThread<'_> {
     fn publish(&mut self) {
         let settings = OutputSettings { home: self.settings.home, parameters: self.links.parameters.get() };
         let counters = IoCounters {
-            allocations: ThreadUsage::allocations_of_this_thread() - self.allocations_at_start,
+            allocations: ThreadUsage::allocator_calls_of_this_thread() - self.allocations_at_start,
             rejected: self.inputs.rejections(),
         };
         let IoLinks { exchange, statistics, delays, snapshots, progress, .. } = &mut self.links;

@@ -85,7 +85,7 @@ fn drive(
             continue;
         }
         // Kept, because the reference is the measured pose plus its error, with the noise of both.
-        has_reference_arrived |= now.reference_or_pose.is_some_and(|x| is_reached(&x, &to));
+        has_reference_arrived |= now.reference_or_measured_x.is_some_and(|x| is_reached(&x, &to));
         let error = error_to(now, &to).filter(|_| has_reference_arrived);
         if arrival.update(window, now.time_ns, &to, error.as_ref()) {
             let error = Deviation(error.unwrap_or_default());
@@ -104,12 +104,12 @@ fn rest(
     constants: &Constants,
 ) -> Result<Option<String>, TargetError> {
     let on_path = stream.as_mut().and_then(|stream| stream.slow_down(source.next_ns()));
-    let x = on_path.map_or_else(|| source.resting_x(constants), Ok)?;
+    let x = on_path.map_or_else(|| source.resting_or_present_x(constants), Ok)?;
     source.speed_share = 1.0;
     while let Some(task) = stream.as_mut().and_then(|stream| stream.next(source.next_ns())) {
         source.publish_motion(task)?;
     }
-    job.rest_at(source, x)?;
+    job.publish_until_reached(source, x)?;
     Ok(None)
 }
 
@@ -121,7 +121,7 @@ fn error_to(seen: &Observation, x: &[f64; 6]) -> Option<Twist> {
 /// The error of a target that was not reached in time.
 fn too_late(seen: &Observation, x: &[f64; 6], window: &InPositionWindow, longest_s: f64) -> TargetError {
     match error_to(seen, x)
-        .filter(|_| seen.reference_or_pose.is_some_and(|reference| is_reached(&reference, x)))
+        .filter(|_| seen.reference_or_measured_x.is_some_and(|reference| is_reached(&reference, x)))
     {
         Some(error) => TargetError::NotInPosition(longest_s, Deviation(error), *window),
         None => TargetError::TimedOut(longest_s),

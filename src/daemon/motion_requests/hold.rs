@@ -18,7 +18,7 @@ pub fn hold_where_it_rests(
     let x = job.start_x(&mut source, constants)?;
     check_target(constants, &pose_of(&x)).map_err(TargetRefusal::Target)?;
     job.send(MotionEvent::Accepted("the platform comes to rest".into()));
-    if job.rest_at(&mut source, x)? {
+    if job.publish_until_reached(&mut source, x)? {
         job.send(MotionEvent::Done("the platform stands under control".into()));
         while job.end().is_none() {
             source.publish(x)?;

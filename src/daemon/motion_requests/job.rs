@@ -107,7 +107,7 @@ impl Job {
     }
 
     /// The newest request of a jog since the last call.
-    pub fn newest_jog(&self) -> Option<Jog> {
+    pub fn take_new_jog(&self) -> Option<Jog> {
         self.jog.take()
     }
 
@@ -140,13 +140,13 @@ impl Job {
         source: &mut TargetSource<'_, JobFeed<'_>>,
         constants: &Constants,
     ) -> Result<[f64; 6], TargetError> {
-        let x = source.resting_x(constants)?;
+        let x = source.resting_or_present_x(constants)?;
         let (now, _) = source.feed.observe()?;
         Ok(reachable_target(constants, now).filter(|target| is_reached(&x, target)).unwrap_or(x))
     }
 
     /// Publishes a target until the reference is there. False if the motion was ended before.
-    pub fn rest_at(
+    pub fn publish_until_reached(
         &self,
         source: &mut TargetSource<'_, JobFeed<'_>>,
         x: [f64; 6],
@@ -159,7 +159,7 @@ impl Job {
             }
             let (now, _) = source.feed.observe()?;
             let is_new = since_ns.is_some_and(|since_ns| now.time_ns >= since_ns) && has_received(now, &x);
-            if is_new && now.reference_or_pose.is_some_and(|reference| is_reached(&reference, &x)) {
+            if is_new && now.reference_or_measured_x.is_some_and(|reference| is_reached(&reference, &x)) {
                 return Ok(true);
             }
         }

@@ -32,7 +32,7 @@ pub fn run(
     loop {
         source.publish(target.x())?;
         let end = job.end();
-        newest = job.newest_jog().unwrap_or(newest);
+        newest = job.take_new_jog().unwrap_or(newest);
         let step_s = core::mem::replace(&mut moved, Instant::now()).elapsed().as_secs_f64().min(MAX_STEP_S);
         let is_moving = end.is_none() && monotonic_ns().saturating_sub(newest.time_ns) < REQUEST_TIMEOUT_NS;
         if source.active_since_ns().is_none() {

@@ -37,7 +37,7 @@ pub(super) fn run(home: [f64; 6], jobs: &Receiver<Job>, snapshots: Reader<Snapsh
         match jobs.recv_timeout(IDLE_INTERVAL) {
             Ok(job) => {
                 let outcome = carry_out(&job, &mut feed, &mut bus);
-                scheduling::ordinary_priority();
+                scheduling::set_ordinary_policy();
                 match outcome {
                     Ok(Some(text)) => job.send(MotionEvent::Done(text)),
                     Ok(None) => {}

@@ -39,7 +39,7 @@ impl GotoPlan {
         seen: &Observation,
         go_on: impl Fn() -> bool,
     ) -> Result<Self, TargetError> {
-        let x = seen.reference_or_pose.ok_or_else(|| TargetError::UnknownPose(reason(&seen.text)))?;
+        let x = seen.reference_or_measured_x.ok_or_else(|| TargetError::UnknownPose(reason(&seen.text)))?;
         let held = reachable_target(constants, seen).unwrap_or(x);
         let from = if is_reached(&x, &held) { held } else { x };
         let base = if order.home { config.machine.home } else { held };

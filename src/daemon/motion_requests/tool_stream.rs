@@ -6,7 +6,7 @@ use crate::precheck::Precheck;
 use crate::rate_change::RateChange;
 use crate::target_source::TargetError;
 use hexad_core::control::signals::limits::Limits;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::target_motion::TargetRefusal;
 use hexad_machine::analysis::tool_motion::ToolMotion;
@@ -71,16 +71,16 @@ impl ToolStream {
     pub fn next(&mut self, now_ns: u64) -> Option<TaskState> {
         let began_ns = *self.began_ns.get_or_insert(now_ns);
         if let Some((slowdown, since_ns)) = self.slowdown {
-            let since_s = seconds_since(since_ns, now_ns);
+            let since_s = seconds_since_or_0(since_ns, now_ns);
             return (!slowdown.has_ended(since_s)).then(|| slowdown.at(since_s, |t| self.task(t)));
         }
-        let t = seconds_since(began_ns, now_ns);
+        let t = seconds_since_or_0(began_ns, now_ns);
         (t < self.motion.duration_s).then(|| self.task(t))
     }
 
     /// Slows down along the path from an instant on. Returns X at rest; `None` if the tool does not move.
     pub fn slow_down(&mut self, now_ns: u64) -> Option<[f64; 6]> {
-        let t = seconds_since(self.began_ns?, now_ns);
+        let t = seconds_since_or_0(self.began_ns?, now_ns);
         if t >= self.motion.duration_s {
             return None;
         }

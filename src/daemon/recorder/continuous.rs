@@ -143,7 +143,7 @@ impl Continuous {
         context: &Context,
         first_cycle: u64,
     ) -> Result<Stream, RecordingError> {
-        let path = folder.next_path(&format!("{:03}", *files + 1));
+        let path = folder.make_room_for_file(&format!("{:03}", *files + 1));
         let file = RecordingFile::create(&path, &context.info, None)?;
         *files += 1;
         Ok(Stream::new(file, first_cycle))

@@ -46,7 +46,7 @@ impl Folder {
     }
 
     /// Path of a new file. Deletes the oldest files to make room for it.
-    pub fn next_path(&self, part: &str) -> PathBuf {
+    pub fn make_room_for_file(&self, part: &str) -> PathBuf {
         // A folder that cannot be read has no files to delete. Opening the new file then reports the error.
         let _ = self.make_room();
         self.path.join(format!("{}.{}.{part}.mcap", self.name, self.started_s))
@@ -107,7 +107,7 @@ mod tests {
             std::thread::sleep(core::time::Duration::from_millis(20));
         }
         let bounds = Bounds { file: 200, total: 800 };
-        let path = Folder::new(folder.path(), "a", 3, bounds).next_path("001");
+        let path = Folder::new(folder.path(), "a", 3, bounds).make_room_for_file("001");
         assert_eq!(path, folder.path().join("a.3.001.mcap"));
         let mut left: Vec<_> = fs::read_dir(folder.path())
             .unwrap()
@@ -132,7 +132,7 @@ mod tests {
         }
         let mut left = vec![];
         for total in [600, 500, 400, 300, 200] {
-            Folder::new(folder.path(), "a", 4, Bounds { file: 100, total }).next_path("003");
+            Folder::new(folder.path(), "a", 4, Bounds { file: 100, total }).make_room_for_file("003");
             let names = fs::read_dir(folder.path()).unwrap();
             left.push(names.map(|it| it.unwrap().file_name().into_string().unwrap()).collect::<Vec<_>>());
         }

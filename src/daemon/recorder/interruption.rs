@@ -1,7 +1,7 @@
 //! Interruption of the recording, from the recorder to the control thread. No thread waits for the other.
 
 use core::sync::atomic::{AtomicU64, Ordering};
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use std::path::PathBuf;
 
 use nix::sys::statvfs::statvfs;
@@ -42,7 +42,7 @@ impl Interruption {
 
     /// Ends it. Returns how long it has lasted \[s\].
     pub fn end(&self) -> f64 {
-        seconds_since(self.since_ns.swap(0, Ordering::Relaxed), monotonic_ns())
+        seconds_since_or_0(self.since_ns.swap(0, Ordering::Relaxed), monotonic_ns())
     }
 
     /// Free space at the last attempt.
@@ -57,7 +57,7 @@ impl Interruption {
     pub fn warning(&self, now_ns: u64) -> Option<String> {
         let since_ns = Some(self.since_ns.load(Ordering::Relaxed)).filter(|since_ns| *since_ns > 0)?;
         let (folder, free) = (self.folder.display(), self.free_text());
-        let lasted_s = seconds_since(since_ns, now_ns);
+        let lasted_s = seconds_since_or_0(since_ns, now_ns);
         Some(format!(
             "the recording in {folder} has been interrupted for {lasted_s:.0} s, with {free}: make room for the 30 s in \
              memory and what follows (docs/recording.md, Size), and it goes on by itself; the log has the cause"

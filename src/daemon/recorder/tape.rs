@@ -70,7 +70,7 @@ impl Tape {
 
     /// First cycle from which a replay of `from` and later cycles is possible: the last cycle up to it with a
     /// memory, else the first later one, else the oldest cycle kept. 0 if there is none.
-    pub fn first_repeatable(&self, from: u64) -> u64 {
+    pub fn first_replayable_or_0(&self, from: u64) -> u64 {
         let oldest = self.oldest();
         let with_memory =
             || self.memories.iter().map(|(cycle, _)| *cycle).filter(|cycle| *cycle >= oldest.max(1));

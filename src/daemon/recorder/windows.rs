@@ -113,9 +113,9 @@ impl Windows {
         if self.faults == MAX_FAULT_WINDOWS {
             warn!("this was fault number {MAX_FAULT_WINDOWS}: the cycles of later ones are not written");
         }
-        let path = folder.next_path(&format!("fault-{code}-cycle-{fault}"));
+        let path = folder.make_room_for_file(&format!("fault-{code}-cycle-{fault}"));
         match RecordingFile::create(&path, &context.info, Some(fault)) {
-            Ok(file) => self.window = Some(Window::new(file, tape, tape.first_repeatable(0), None)),
+            Ok(file) => self.window = Some(Window::new(file, tape, tape.first_replayable_or_0(0), None)),
             Err(error) => warn!("the cycles around the fault are lost: {error}"),
         }
     }
@@ -129,7 +129,7 @@ impl Windows {
         let from = tape.newest().saturating_sub((last_s * context.rate as f64) as u64);
         match RecordingFile::write_to(file, Path::new(PASSED_FILE), &context.info, None) {
             Ok(file) => {
-                self.window = Some(Window::new(file, tape, tape.first_repeatable(from), Some(answer)))
+                self.window = Some(Window::new(file, tape, tape.first_replayable_or_0(from), Some(answer)))
             }
             Err(error) => drop(answer.send(Err(error.to_string()))),
         }

@@ -20,7 +20,7 @@ use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad_core::control::signals::limits::DerivativeLimits;
 use hexad_core::control::signals::state::State;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::rigid::Twist;
 use hexad_core::model::task::{TaskState, pose_of, task_coordinates};
 use hexad_machine::analysis::target_motion::{REACHED_M, REACHED_RAD, check_target};
@@ -40,7 +40,7 @@ const MAX_INTERVAL_S: f64 = 0.5;
 
 /// X at which the platform stands under control, held after its source has ended; `None` if no daemon is in control.
 /// An error with the reason if another source cannot take over.
-pub fn held_x(config: &Config) -> Result<Option<[f64; 6]>, String> {
+pub fn request_held_x(config: &Config) -> Result<Option<[f64; 6]>, String> {
     let Some(answer) = status(&config.name).ok() else { return Ok(None) };
     let Some(seen) = Observation::of_answer(&answer, 0, &config.machine.home)
         .filter(|observation| observation.state.has_control())
@@ -53,8 +53,8 @@ pub fn held_x(config: &Config) -> Result<Option<[f64; 6]>, String> {
     }
     // Without setpoints, `on_violation = "limit"` holds the reference.
     let is_holding = DiagnosticCode::from_number(seen.code).is_some_and(DiagnosticCode::holds_pose);
-    let held = if is_holding { seen.reference_or_pose } else { seen.target };
-    let (Some(held), Some(reference)) = (held, seen.reference_or_pose) else {
+    let held = if is_holding { seen.reference_or_measured_x } else { seen.target };
+    let (Some(held), Some(reference)) = (held, seen.reference_or_measured_x) else {
         let state = seen.state.name();
         return Err(format!("the platform follows another source or a stop: the daemon is in {state}"));
     };
@@ -154,24 +154,24 @@ impl<'a, F: Feed> TargetSource<'a, F> {
     /// X of the reference or of the platform now.
     pub fn present_x(&mut self) -> Result<[f64; 6], TargetError> {
         let (now, _) = self.feed.observe()?;
-        now.reference_or_pose.ok_or_else(|| TargetError::UnknownPose(reason(&now.text)))
+        now.reference_or_measured_x.ok_or_else(|| TargetError::UnknownPose(reason(&now.text)))
     }
 
     /// X at which the platform comes to rest if it brakes now with the limits of autonomous motions. The
     /// present X, if that one is outside the workspace.
-    pub fn resting_x(&mut self, constants: &Constants) -> Result<[f64; 6], TargetError> {
+    pub fn resting_or_present_x(&mut self, constants: &Constants) -> Result<[f64; 6], TargetError> {
         let (newest, before) = self.feed.observe()?;
-        let of = |observation: &Observation| Some(pose_of(&observation.reference_or_pose?));
+        let of = |observation: &Observation| Some(pose_of(&observation.reference_or_measured_x?));
         let now = of(newest).ok_or_else(|| TargetError::UnknownPose(reason(&newest.text)))?;
         let earlier = before.and_then(|before| {
-            let interval_s = seconds_since(before.time_ns, newest.time_ns);
+            let interval_s = seconds_since_or_0(before.time_ns, newest.time_ns);
             Some((of(before)?, interval_s))
                 .filter(|_| interval_s > 0.0 && interval_s < MAX_INTERVAL_S && newest.state.has_control())
         });
         let Some((then, interval_s)) = earlier else { return self.present_x() };
         let moved = then.displacement_to(&now);
         let limits = &constants.parameters.limits;
-        let age_s = seconds_since(newest.time_ns, monotonic_ns());
+        let age_s = seconds_since_or_0(newest.time_ns, monotonic_ns());
         let ahead = |moved: Vector3<f64>, limits: &DerivativeLimits| {
             let DerivativeLimits { acceleration, jerk, .. } =
                 limits.scaled(constants.parameters.limits.autonomous_scale);

@@ -24,7 +24,7 @@ pub struct Observation {
     /// Measured X.
     pub pose: Option<[f64; 6]>,
     /// X of the reference under control, else of the platform.
-    pub reference_or_pose: Option<[f64; 6]>,
+    pub reference_or_measured_x: Option<[f64; 6]>,
     /// X of the newest setpoint.
     pub setpoint: Option<[f64; 6]>,
     /// X of the target that is followed or held.
@@ -77,6 +77,6 @@ impl Observation {
         });
         let displaced =
             |(pose, error): ([f64; 6], Twist)| task_coordinates(&pose_of(&pose).displaced(&error), home);
-        Self { reference_or_pose: pose.zip(error).map(displaced).or(pose), pose, ..self }
+        Self { reference_or_measured_x: pose.zip(error).map(displaced).or(pose), pose, ..self }
     }
 }

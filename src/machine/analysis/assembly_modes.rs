@@ -26,7 +26,7 @@ const CONFUSABLE_DISTANCE: f64 = 0.5;
 /// # let machine = hexad_machine::config::Config::load("../../config/tsai2000.toml".as_ref()).unwrap().machine;
 /// let home = machine.home_pose();
 /// let modes = permitted_modes(&machine, &leg_lengths(&machine, &home));
-/// assert!(modes.are_all && machine.joints.distance(modes.poses[0].pose(), &home) < 1e-6);
+/// assert!(modes.is_proved_complete && machine.joints.distance(modes.poses[0].pose(), &home) < 1e-6);
 /// ```
 pub fn permitted_modes(machine: &Machine, lengths: &[f64; LEGS]) -> Modes {
     let home = machine.home_pose();

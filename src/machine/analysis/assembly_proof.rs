@@ -56,7 +56,7 @@ pub struct Modes {
     /// Each once.
     pub poses: Vec<KinematicState>,
     /// Whether it is proved that none is missing.
-    pub are_all: bool,
+    pub is_proved_complete: bool,
 }
 
 /// The poses with these lengths \[m\] that are rotated from an orientation by at most `max_turn` \[rad\], on all sides of the singular poses.
@@ -73,7 +73,7 @@ pub fn all_modes(
         .flat_map(|x| axis().flat_map(move |y| axis().map(move |z| Vector3::new(x, y, z))))
         .map(|k| Cell { turn: k.map(f64::from) * 2.0 * FIRST_HALF_EDGE_RAD, half: FIRST_HALF_EDGE_RAD })
         .collect();
-    let (mut modes, mut examined) = (Modes { poses: vec![], are_all: true }, 0);
+    let (mut modes, mut examined) = (Modes { poses: vec![], is_proved_complete: true }, 0);
     while let Some(cell) = cells.pop_front() {
         if cell.turn.norm() - cell.radius() > max_turn {
             continue;
@@ -85,7 +85,7 @@ pub fn all_modes(
             regions.into_iter().flatten().filter(|it| !legs.decides(*it, &mut modes.poses, is_last));
         match undecided.count() {
             0 => {}
-            _ if is_last => modes.are_all = false,
+            _ if is_last => modes.is_proved_complete = false,
             _ => cells.extend(cell.eighths()),
         }
     }

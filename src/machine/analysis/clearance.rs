@@ -47,7 +47,7 @@ use hexad_core::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::rigid::Pose;
-use hexad_core::model::sensitivity::MAX_WRENCH_NORM;
+use hexad_core::model::sensitivity::MAX_LEG_WRENCHES_NORM;
 
 /// Smallest usual share of the linear part in the bound of a change. Only the computing time depends on it.
 const MIN_LINEAR_SHARE: f64 = 0.1;
@@ -178,12 +178,12 @@ impl<'a> Clearance<'a> {
         if !(universal_sine(self.machine, pose) >= self.least_universal_sine) {
             return Some(WorkspaceLimit::UniversalJoint);
         }
-        let (leg, force) = DriveCapability::of(&self.dynamics, pose)?.hardest_held();
+        let (leg, force) = DriveCapability::of(&self.dynamics, pose)?.largest_holding_force();
         (!(force <= self.holding_force())).then_some(WorkspaceLimit::HoldingForce(leg))
     }
 
     fn holding_force(&self) -> f64 {
-        MAX_HOLDING_SHARE * self.machine.actuator.available_force()
+        MAX_HOLDING_SHARE * self.machine.actuator.weakest_available_force_n()
     }
 
     /// Whether a proof exists that in a cell no leg is near the first axis of its universal joint, and that the drives can hold
@@ -204,7 +204,7 @@ impl<'a> Clearance<'a> {
     }
 
     /// Lower bound of [`Clearance::margin`] anywhere in a cell.
-    pub fn least_margin(&self, shape: &RegionShape, cell: &PoseCell) -> f64 {
+    pub fn least_stroke_margin(&self, shape: &RegionShape, cell: &PoseCell) -> f64 {
         let actuator = &self.machine.actuator;
         let pose = self.pose(shape, &cell.middle);
         let wrenches = leg_wrenches(self.machine, &pose);
@@ -255,7 +255,7 @@ impl<'a> Clearance<'a> {
         let wrenches = scaled_wrenches(self.machine, kinematic_state.pose());
         let norm = wrenches.norm();
         let inverse = kinematic_state.sensitivity().condition / norm;
-        let most = (norm + change).min(MAX_WRENCH_NORM) * inverse / self.largest_condition;
+        let most = (norm + change).min(MAX_LEG_WRENCHES_NORM) * inverse / self.largest_condition;
         let holds = |share: f64| {
             most <= 1.0 - share && self.is_held(kinematic_state.pose(), turn, turned_leg, change, 1.0 - share)
         };

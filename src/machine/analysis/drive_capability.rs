@@ -24,10 +24,10 @@ use hexad_core::model::rigid::Pose;
 /// use hexad_machine::analysis::drive_capability::DriveCapability;
 /// # let machine = hexad_machine::config::Config::load("../../config/motion_base.toml".as_ref()).unwrap().machine;
 /// let drives = DriveCapability::new(&machine, &machine.home_pose()).unwrap();
-/// let force = machine.actuator.available_force();
+/// let force = machine.actuator.weakest_available_force_n();
 /// // What one acceleration takes, the other lacks.
 /// assert!(drives.angular_acceleration(force, 5.0) < drives.angular_acceleration(force, 0.0));
-/// assert!(drives.hardest_held().1 < force);
+/// assert!(drives.largest_holding_force().1 < force);
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DriveCapability {
@@ -78,7 +78,7 @@ impl DriveCapability {
     }
 
     /// The leg that needs the largest force at rest, counted from 0, and that force \[N\].
-    pub fn hardest_held(&self) -> (usize, f64) {
+    pub fn largest_holding_force(&self) -> (usize, f64) {
         let forces = self.loads.iter().map(|leg| leg.holding).enumerate();
         forces.fold((0, 0.0), |most, leg| if leg.1 > most.1 { leg } else { most })
     }
@@ -91,7 +91,7 @@ impl DriveCapability {
     }
 
     /// Largest acceleration of C in any direction with `force` \[N\], together with an angular one in any direction \[m/s^2\].
-    pub fn linear_acceleration(&self, force: f64, angular: f64) -> f64 {
+    pub fn max_linear_acceleration(&self, force: f64, angular: f64) -> f64 {
         least(self.loads.iter().map(|leg| (force - leg.holding - angular * leg.angular) / leg.linear))
     }
 

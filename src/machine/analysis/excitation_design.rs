@@ -13,7 +13,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector6};
 
-use super::sampled_loop::edge_in_steps;
+use super::sampled_loop::bisect_in_steps;
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::machine::Machine;
@@ -81,7 +81,7 @@ pub fn design(
         let share = (1..=MAX_HALVINGS)
             .map(|halvings| MAX_GROWTH * 0.5_f64.powi(halvings))
             .find(|share| keeps_limits(*share))?;
-        let share = edge_in_steps(AMPLITUDE_STEPS, share, 2.0 * share, keeps_limits);
+        let share = bisect_in_steps(AMPLITUDE_STEPS, share, 2.0 * share, keeps_limits);
         let largest = shape.scaled(share);
         Some((largest, Sensitivities::new(machine, &largest.scaled(amplitude))?.condition))
     };
@@ -140,7 +140,7 @@ fn pairs(machine: &Machine) -> impl Iterator<Item = [usize; 2]> {
 
 /// Value of each parameter as a base parameter: sums of pairs, and the rods' masses as points of the platform at the
 /// `B_i`.
-pub fn base_values(machine: &Machine) -> DynamicParameters {
+pub fn base_parameter_values(machine: &Machine) -> DynamicParameters {
     let mut values = dynamic_parameters(machine);
     let rod_mass = values.get(ROD_MASS).copied().unwrap_or_default();
     values -= rod_mass_null_direction(machine) * rod_mass;
@@ -158,7 +158,7 @@ pub fn base_parameters(machine: &Machine) -> Vec<usize> {
             || pairs(machine).any(|[_, second]| second == k)
             || QUADRATIC.contains(&k) && value == 0.0
     };
-    let values = base_values(machine);
+    let values = base_parameter_values(machine);
     let indices = values.iter().copied().enumerate().filter(|indexed| !has_no_effect(*indexed));
     indices.map(|(k, _)| k).collect()
 }

@@ -37,7 +37,7 @@ const MAX_SWEEPS_PER_STEP: u32 = 4;
 
 /// Force error of one fidelity over an envelope or a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FidelityError {
+pub struct FidelityForceErrors {
     /// The fidelity.
     pub fidelity: Fidelity,
     /// Mean over the even spread, or over the rows \[N\].
@@ -58,7 +58,7 @@ pub struct FidelityComparison {
     /// Statistics of all points.
     pub all: ErrorStatistics,
     /// In the order of [`Fidelity::ALL`].
-    pub errors: [FidelityError; FIDELITY_COUNT],
+    pub errors: [FidelityForceErrors; FIDELITY_COUNT],
 }
 
 impl FidelityComparison {
@@ -111,14 +111,19 @@ impl FidelityComparison {
     /// The first part is the inside.
     fn new(parts: &[ErrorStatistics], all: ErrorStatistics) -> Self {
         let inside = parts.first().copied().unwrap_or_default();
-        let nothing =
-            FidelityError { fidelity: Fidelity::Exact, mean_n: 0.0, rms_n: 0.0, max_n: 0.0, share: 0.0 };
+        let nothing = FidelityForceErrors {
+            fidelity: Fidelity::Exact,
+            mean_n: 0.0,
+            rms_n: 0.0,
+            max_n: 0.0,
+            share: 0.0,
+        };
         let mut errors = [nothing; FIDELITY_COUNT];
         for (number, (error, fidelity)) in errors.iter_mut().zip(Fidelity::ALL).enumerate() {
             let errors =
                 |statistics: &ErrorStatistics| statistics.errors.get(number).copied().unwrap_or_default();
             let share = |statistics: &ErrorStatistics| share(errors(statistics).max_n, statistics.peak_n);
-            *error = FidelityError {
+            *error = FidelityForceErrors {
                 fidelity,
                 mean_n: inside.mean(&errors(&inside)),
                 rms_n: inside.rms(&errors(&inside)),
@@ -132,7 +137,7 @@ impl FidelityComparison {
     /// The fidelities whose largest error is within a tolerance, given as a share of the peak force, less 5 %; in the
     /// order of [`Fidelity::ALL`], which is the same on every computer, as measured times are not. The last one is the
     /// exact model.
-    pub fn within(&self, tolerance: f64) -> impl Iterator<Item = &FidelityError> {
+    pub fn within(&self, tolerance: f64) -> impl Iterator<Item = &FidelityForceErrors> {
         self.errors.iter().filter(move |error| TOLERANCE_MARGIN * error.share <= tolerance)
     }
 

@@ -82,7 +82,7 @@ impl HeldForces {
 
     /// Bounds of the angular \[rad/s^3\] and linear \[m/s^3\] jerk of the platform while forces are held: `|A v|` for velocities v within
     /// the limits and within the largest rates of the legs, the lesser of both bounds; `None` at a singular pose.
-    pub fn jerk_bounds(&self, pose: &Pose, limits: &Limits) -> Option<[f64; 2]> {
+    pub fn angular_and_linear_jerk_bounds(&self, pose: &Pose, limits: &Limits) -> Option<[f64; 2]> {
         let (machine, growth) = (self.model.machine(), self.growth(pose)?);
         let by_rates = growth * leg_wrenches(machine, pose).transpose().try_inverse()?;
         Some([0, 3].map(|row| {

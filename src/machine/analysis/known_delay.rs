@@ -14,7 +14,7 @@ impl SampledLoop {
     /// The longest known delay, in periods, with which the loop is stable for each of `masses`, as ratios of the
     /// modelled mass. The unknown part of the delay stays as it is. A delay beyond `KNOWN_DELAY_PERIODS` is computed
     /// for a loop with longer periods; the true loop is stable with a longer one.
-    pub fn longest_known_delay(&self, masses: &[f64]) -> f64 {
+    pub fn longest_known_delay_periods(&self, masses: &[f64]) -> f64 {
         let mut periods = 1.0;
         loop {
             let delay = self.coarse_known_delay(periods, masses);
@@ -26,7 +26,7 @@ impl SampledLoop {
     }
 
     /// Whether the loop is stable with a known delay, in periods, for each of `masses`. A long delay is computed for a
-    /// loop with longer periods. Much faster than [`SampledLoop::longest_known_delay`].
+    /// loop with longer periods. Much faster than [`SampledLoop::longest_known_delay_periods`].
     pub fn is_stable_with_known_delay(&self, delay: f64, masses: &[f64]) -> bool {
         let mut periods = 1.0;
         while delay / periods > KNOWN_DELAY_PERIODS {

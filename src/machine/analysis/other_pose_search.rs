@@ -63,7 +63,7 @@ pub struct PoseDistance {
 impl OtherPoseSearch {
     /// Searches so many rest poses, fewer for a large permitted rotation; home alone if it is not usable.
     pub fn new(machine: &Machine, clearance: &Clearance, usual_count: usize) -> Self {
-        let count = (usual_count as f64 * search_density(machine).powi(2)) as usize;
+        let count = (usual_count as f64 * relative_search_density(machine).powi(2)) as usize;
         let (poses, home) = (rest_poses(machine, clearance, count), machine.home_pose());
         let rotation = |pose: &Pose| home.displacement_to(pose).angular.norm();
         let found: Vec<_> = poses.par_iter().map(|pose| nearest_permitted(machine, pose)).collect();
@@ -73,7 +73,8 @@ impl OtherPoseSearch {
             ambiguous_poses: ambiguous().count(),
             largest_rotation_rad: poses.iter().map(rotation).fold(0.0, f64::max),
             ambiguous_from_rad: ambiguous().map(|(pose, _)| rotation(pose)).min_by(f64::total_cmp),
-            proved_at_home: other_permitted_modes(machine, &KinematicState::new(machine, home)).are_all,
+            proved_at_home: other_permitted_modes(machine, &KinematicState::new(machine, home))
+                .is_proved_complete,
             at_home: found.first().copied().flatten(),
             nearest: nearest(found.into_iter().flatten()),
         }
@@ -81,7 +82,7 @@ impl OtherPoseSearch {
 }
 
 /// Poses along an axis that are worth their time, relative to a machine with the usual rotation.
-pub fn search_density(machine: &Machine) -> f64 {
+pub fn relative_search_density(machine: &Machine) -> f64 {
     (USUAL_ROTATION_RAD / machine.max_rotation_rad).min(1.0)
 }
 

@@ -114,7 +114,7 @@ impl PoseEvaluator {
             |legs: [LegForceBound; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
         let payload = |legs: [LegForceBound; LEGS]| {
             legs.iter()
-                .map(|leg| leg.payload(machine.actuator.available_force()))
+                .map(|leg| leg.payload(machine.actuator.weakest_available_force_n()))
                 .fold(f64::INFINITY, f64::min)
         };
         PoseQuality {

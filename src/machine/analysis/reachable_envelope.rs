@@ -84,5 +84,7 @@ fn has_reserve(model: &InverseDynamics, state: &TaskState) -> bool {
     let motion = state.motion();
     let within = |values: &[f64], limit: f64| values.iter().all(|x| x.abs() <= USABLE_SHARE * limit);
     within(&leg_motion(model.machine(), &motion).rate_m_s, actuator.max_rate_m_s)
-        && model.forces::<Exact>(&motion).is_some_and(|force| within(&force, actuator.available_force()))
+        && model
+            .forces::<Exact>(&motion)
+            .is_some_and(|force| within(&force, actuator.weakest_available_force_n()))
 }

@@ -54,8 +54,9 @@ pub fn prove(machine: &Machine, clearance: &Clearance, bounds: &EnvelopeBounds) 
         }
     }
     let shape = RegionShape::Box { low: bounds.pose_min, high: bounds.pose_max };
-    let is_clear =
-        |cell: &PoseCell| clearance.is_regular(&shape, cell) && clearance.least_margin(&shape, cell) >= 0.0;
+    let is_clear = |cell: &PoseCell| {
+        clearance.is_regular(&shape, cell) && clearance.least_stroke_margin(&shape, cell) >= 0.0
+    };
     // The last first, so that the queue stays short. On one thread: a daemon at its start has no others to spare.
     let (mut queue, mut examined) = (vec![shape.cell(1.0)], 0);
     while let Some(cell) = queue.pop() {

@@ -53,8 +53,9 @@ pub fn largest_region(
     let violation = |cell: &PoseCell| clearance.violation(shape, cell);
     let start = first_violation(clearance, shape);
     let RegionShape::Ball { .. } = shape else {
-        let is_clear =
-            |cell: &PoseCell| clearance.is_regular(shape, cell) && clearance.least_margin(shape, cell) >= 0.0;
+        let is_clear = |cell: &PoseCell| {
+            clearance.is_regular(shape, cell) && clearance.least_stroke_margin(shape, cell) >= 0.0
+        };
         let examine = |cell: &PoseCell| (shape.size(cell).filter(|_| !is_clear(cell)), violation(cell));
         return search(shape.cell(start.0), start, arm, examine, bar);
     };
@@ -63,7 +64,7 @@ pub fn largest_region(
         let of_family = |cell: &PoseCell| shape.size(cell).is_some();
         let middle = PoseCell { half: [0.0; 6], ..*cell };
         let found = of_family(&middle).then(|| clearance.margin(shape, &middle));
-        (of_family(cell).then(|| clearance.least_margin(shape, cell)), found)
+        (of_family(cell).then(|| clearance.least_stroke_margin(shape, cell)), found)
     };
     let within_stroke = search(shape.cell(0.0), start, arm, stroke, bar);
     let start = within_stroke.violation.map_or(start, |found| (found.0.max(0.0), Some(found)));

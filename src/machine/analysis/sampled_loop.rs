@@ -310,11 +310,11 @@ impl SampledLoop {
 
 /// The last of the numbers from `inside` towards `outside` for which a condition holds, by bisection.
 pub fn edge(inside: f64, outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    edge_in_steps(BISECTION_STEPS, inside, outside, holds)
+    bisect_in_steps(BISECTION_STEPS, inside, outside, holds)
 }
 
 /// The same to the precision of so many steps.
-pub fn edge_in_steps(steps: u32, mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
+pub fn bisect_in_steps(steps: u32, mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..steps {
         let middle = 0.5 * (inside + outside);
         if holds(middle) {

@@ -228,10 +228,12 @@ pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBoun
     bounds.push(WorkspaceBound { quantity, value: condition, bound: largest, margin: largest - condition });
     let (quantity, bound) = (BoundedQuantity::UniversalSine, constants.least_universal_sine);
     bounds.push(WorkspaceBound { quantity, value: sine, bound, margin: sine - bound });
-    let drives = DriveCapability::of(&constants.dynamics, pose).map(|drives| drives.hardest_held());
+    let drives = DriveCapability::of(&constants.dynamics, pose).map(|drives| drives.largest_holding_force());
     let (leg, force) = drives.unwrap_or((0, f64::INFINITY));
-    let (quantity, bound) =
-        (BoundedQuantity::HoldingForce(leg), MAX_HOLDING_SHARE * machine.actuator.available_force());
+    let (quantity, bound) = (
+        BoundedQuantity::HoldingForce(leg),
+        MAX_HOLDING_SHARE * machine.actuator.weakest_available_force_n(),
+    );
     bounds.push(WorkspaceBound { quantity, value: force, bound, margin: bound - force });
     bounds
 }

@@ -17,7 +17,7 @@ pub(super) enum Bound {
     /// At least [`MIN_POSITIVE_VALUE`], or infinite: without a bound.
     PositiveOrInfinite,
     /// At least [`MIN_POSITIVE_VALUE`] and up to the limit.
-    UpTo(f64),
+    PositiveUpTo(f64),
     /// Both ends included.
     Within(f64, f64),
 }
@@ -36,7 +36,7 @@ impl Bound {
             Self::Positive | Self::PositiveOrInfinite => x >= MIN_POSITIVE_VALUE,
             Self::NotNegative => x >= 0.0,
             Self::NotPositive => x <= 0.0,
-            Self::UpTo(high) => x >= MIN_POSITIVE_VALUE && x <= high,
+            Self::PositiveUpTo(high) => x >= MIN_POSITIVE_VALUE && x <= high,
             Self::Within(low, high) => (low..=high).contains(&x),
         };
         match (x.abs() <= MAX_MAGNITUDE, admits) {
@@ -61,7 +61,7 @@ impl fmt::Display for Bound {
             Self::PositiveOrInfinite => write!(f, "greater than 0 and at most {MAX_MAGNITUDE:e}, or inf"),
             Self::NotNegative => write!(f, "at least 0"),
             Self::NotPositive => write!(f, "at most 0"),
-            Self::UpTo(high) => write!(f, "greater than 0 and at most {high}"),
+            Self::PositiveUpTo(high) => write!(f, "greater than 0 and at most {high}"),
             Self::Within(low, high) => write!(f, "in [{low}, {high}]"),
         }
     }

@@ -38,7 +38,7 @@ fn loops_of(
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
     ];
     let each = if control.mode.acts_on_legs() {
-        vec![("legs", position, control.leg_masses.stiffest_mode_gain)]
+        vec![("legs", position, control.leg_masses.stiffest_mode_gain_ratio)]
     } else {
         vec![("position", position, 1.0), ("orientation", orientation, 1.0)]
     };
@@ -63,7 +63,7 @@ const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 
 /// Largest constant age of the measurements with which all loops are stable and the estimator still has the
 /// accelerations sent since \[s\]. At least the age that the measurements have in any case.
-pub fn longest_age_s(deployment: &Deployment) -> f64 {
+pub fn longest_stable_age_s(deployment: &Deployment) -> f64 {
     let recorded = SENT_ACCELERATIONS as f64 - 1.0;
     let recorded_s = recorded * deployment.realtime.period_s() - deployment.drive.total_delay_s();
     let Deployment { realtime, control, drive, limits, .. } = deployment;
@@ -74,8 +74,9 @@ pub fn longest_age_s(deployment: &Deployment) -> f64 {
 fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive, limits: &DeploymentLimits) -> f64 {
     let sampled =
         loops_of(realtime, control, drive, limits).into_iter().map(|it| it.sampled).filter(is_finite);
-    let delays =
-        sampled.map(|sampled| sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay_periods));
+    let delays = sampled.map(|sampled| {
+        sampled.longest_known_delay_periods(&MASSES_AT_LONGEST_AGE).max(sampled.delay_periods)
+    });
     delays.fold(f64::INFINITY, f64::min) * realtime.period_s() - drive.total_delay_s()
 }
 

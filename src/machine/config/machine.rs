@@ -126,7 +126,7 @@ fn usual_friction_uncertainty(machine: &Machine) -> f64 {
     let at_home = TaskState::at_rest(machine.home).motion();
     let held = InverseDynamics::new(machine).forces_of(Fidelity::Gravity, &at_home).unwrap_or_default();
     let largest = held.into_iter().map(f64::abs).fold(0.0, f64::max);
-    (USUAL_FRICTION_PER_MAX_FORCE * machine.actuator.available_force())
+    (USUAL_FRICTION_PER_MAX_FORCE * machine.actuator.weakest_available_force_n())
         .min(USUAL_FRICTION_PER_HOLDING * largest)
 }
 

@@ -96,7 +96,7 @@ impl<'t> SectionReader<'t> {
     }
 
     /// A number that has no bound by default.
-    pub fn bounded_number(&mut self, key: &'static str, bound: Bound) -> Option<f64> {
+    pub fn optional_number(&mut self, key: &'static str, bound: Bound) -> Option<f64> {
         Some(self.number_or(key, f64::INFINITY, bound)).filter(|number| number.is_finite())
     }
 

@@ -7,7 +7,7 @@
 use toml::de::DeTable;
 
 use super::Violation;
-use crate::text::excerpt::{excerpt, stranger_in_toml};
+use crate::text::excerpt::{excerpt, non_ascii_clause_in_toml};
 
 /// Largest number of syntax errors; a file with more is no configuration. Bounds the work, one parse per error.
 const MAX_SYNTAX_ERRORS: usize = 20;
@@ -29,7 +29,7 @@ pub(super) fn without_broken_lines(text: &str) -> (String, Vec<Violation>) {
             line: broken + 1,
             key: "TOML syntax".into(),
             value: lines.get(broken).map(|line| excerpt(line)),
-            bound: error.message().to_owned() + &stranger_in_toml(lines.get(broken).unwrap_or(&"")),
+            bound: error.message().to_owned() + &non_ascii_clause_in_toml(lines.get(broken).unwrap_or(&"")),
         });
         if violations.len() == MAX_SYNTAX_ERRORS {
             return (String::new(), violations);

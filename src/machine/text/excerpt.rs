@@ -54,7 +54,7 @@ pub fn stranger(text: &str) -> String {
 }
 
 /// The same of a line of TOML with an error; what is in quotes or a comment may be any character.
-pub fn stranger_in_toml(line: &str) -> String {
+pub fn non_ascii_clause_in_toml(line: &str) -> String {
     stranger(line.split(['"', '\'', '#']).next().unwrap_or_default())
 }
 
@@ -66,7 +66,7 @@ pub fn toml_error(text: &str, error: &toml::de::Error) -> String {
         ends = ends.start + line.len()..;
         ends.start > at
     });
-    format!("{}{}", error.to_string().trim_end(), stranger_in_toml(line.unwrap_or_default()))
+    format!("{}{}", error.to_string().trim_end(), non_ascii_clause_in_toml(line.unwrap_or_default()))
 }
 
 #[cfg(test)]

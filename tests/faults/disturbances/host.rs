@@ -4,7 +4,7 @@ use super::super::world::{Grip, World};
 use super::Moment;
 
 pub fn deadline_missed(m: &mut Moment) {
-    m.input.overrun_is_fault = m.cycle == 0;
+    m.input.had_faulty_overrun = m.cycle == 0;
 }
 
 /// SIGSTOP and SIGCONT a second later.

@@ -26,7 +26,7 @@ pub fn drive_fault(m: &mut Moment) {
 pub fn bus_failed(m: &mut Moment) {
     let measured = m.measured();
     measured.length_m = [0.0; LEGS];
-    measured.drives = DriveStatus { fault: Some(DriveStatus::BUS_FAILED), ..DriveStatus::default() };
+    measured.drives = DriveStatus { fault: Some(DriveStatus::BUS_FAILED_BIT), ..DriveStatus::default() };
 }
 
 pub fn half_of_a_force(m: &mut Moment) {

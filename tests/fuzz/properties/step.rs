@@ -174,7 +174,7 @@ impl<'a> Play<'a> {
             14 => match place % 4 {
                 0 => input.setpoint = None,
                 1 => input.measurement = None,
-                2 => input.overrun_is_fault = true,
+                2 => input.had_faulty_overrun = true,
                 _ => {
                     input.request = Some(OperatorRequest {
                         request: Request::ALL[place % 6],

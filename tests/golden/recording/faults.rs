@@ -129,10 +129,10 @@ fn drives_and_external_poses(recorder: &mut Recorder) {
 fn bus_of_drives_fails(recorder: &mut Recorder) {
     recorder.always = report;
     let faults: &[Fault] = &[
-        (14, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED)),
-        (1, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED | 8)),
+        (14, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED_BIT)),
+        (1, |m| m.measured().drives.fault = Some(DriveStatus::BUS_FAILED_BIT | 8)),
         (30, |m| {
-            m.measured().drives.fault = Some(DriveStatus::BUS_FAILED);
+            m.measured().drives.fault = Some(DriveStatus::BUS_FAILED_BIT);
             m.measured().length_m = [f64::NAN; LEGS];
         }),
     ];
@@ -161,15 +161,15 @@ fn stamps(recorder: &mut Recorder) {
         m.input.setpoint_publishers.used_pid = 4711;
         m.input.measured_publishers.used_pid = 4712;
     };
-    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored_pid = 4713);
+    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored_pid_or_0 = 4713);
     recorder.ask(Request::Engage);
-    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored_pid = 4713);
+    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored_pid_or_0 = 4713);
     recorder.ask(Request::Engage);
-    recorder.run_with(30, |m| m.input.measured_publishers.ignored_pid = 4714);
+    recorder.run_with(30, |m| m.input.measured_publishers.ignored_pid_or_0 = 4714);
     recorder.engage();
     recorder.go(MOVES, 0.5);
     recorder.run(150);
-    recorder.run_with(1, |m| m.input.overrun_is_fault = true);
+    recorder.run_with(1, |m| m.input.had_faulty_overrun = true);
     recorder.until(State::Fault);
     recorder.engage();
     recorder.play(BuiltInMotion::Circle, 3.0);
@@ -186,7 +186,8 @@ fn stamps(recorder: &mut Recorder) {
     recorder.run(100);
     // Two sources once control has begun.
     recorder.run_with(100, |m| {
-        (m.input.setpoint_publishers.ignored_pid, m.input.measured_publishers.ignored_pid) = (4715, 4716);
+        (m.input.setpoint_publishers.ignored_pid_or_0, m.input.measured_publishers.ignored_pid_or_0) =
+            (4715, 4716);
     });
     recorder.pause(40);
     recorder.run(20);

@@ -179,7 +179,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
         payload_change_kg: Some(UNLIMITED),
         disturbance_step_m_s2: Some(UNLIMITED),
         feedback_scale: UNLIMITED,
-        reading_errors: ReadingErrors { deviation_m: UNLIMITED, resolution_m: 0.0 },
+        reading_errors: ReadingErrors { deviation_m: UNLIMITED, resolution_or_0_m: 0.0 },
         ..parameters
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use hexad_client::realtime::allocation::calls_of_this_thread;
+use hexad_client::realtime::allocation::allocator_calls_of_this_thread;
 use hexad_client::realtime::process::block_signals;
 use hexad_client::realtime::setup::{Shortfall, memory, scheduling};
 use hexad_client::realtime::stop_request::Stop;
@@ -66,7 +66,7 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
     let ((mut counts, shown), has_ended) = (triple_buffer(driver.counts), AtomicBool::new(false));
     let (outcome, allocations) = thread::scope(|scope| {
         scope.spawn(|| log_changes(shown, &has_ended));
-        let allocations = calls_of_this_thread();
+        let allocations = allocator_calls_of_this_thread();
         let outcome = loop {
             let outcome = driver.cycle(&mut bus, &devices);
             counts.write(driver.counts);
@@ -80,7 +80,7 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
                 break;
             }
         }
-        let allocations = calls_of_this_thread() - allocations;
+        let allocations = allocator_calls_of_this_thread() - allocations;
         has_ended.store(true, Ordering::Relaxed);
         (outcome.map_err(after_start).and(driver.daemon.end().map_err(after_start)), allocations)
     });
@@ -95,7 +95,7 @@ pub fn run(drives: &Path, machine: &Path) -> Result<(), Failure> {
 /// Logs what the cycle counts, at ordinary priority: the cycle itself neither logs nor allocates.
 fn log_changes(mut counts: Reader<Counts>, has_ended: &AtomicBool) {
     block_signals();
-    scheduling::ordinary_priority();
+    scheduling::set_ordinary_policy();
     let mut logged = Counts::default();
     loop {
         let is_last = has_ended.load(Ordering::Relaxed);

@@ -1,6 +1,6 @@
 //! Closed loop in lock-step: driver and segment may add little to the tracking error of the same loop without them.
 
-use hexad_client::realtime::allocation::{CountingAllocator, calls_of_this_thread};
+use hexad_client::realtime::allocation::{CountingAllocator, allocator_calls_of_this_thread};
 use hexad_core::control::signals::inputs::Measurement;
 use hexad_core::control::signals::state::{Request, State};
 use hexad_core::model::LEGS;
@@ -123,7 +123,7 @@ fn a_cycle_allocates_nothing() {
     let frames = Frames::new();
     let mut rig = Rig::new(&frames, &drives(), segment());
     rig.engage_and_move();
-    let before = calls_of_this_thread();
+    let before = allocator_calls_of_this_thread();
     rig.cycles(500);
-    assert_eq!(calls_of_this_thread() - before, 0);
+    assert_eq!(allocator_calls_of_this_thread() - before, 0);
 }

@@ -1,6 +1,6 @@
 //! Table of failures during motion: what becomes of the drives, and how far the platform still moves.
 
-use hexad_client::realtime::allocation::calls_of_this_thread;
+use hexad_client::realtime::allocation::allocator_calls_of_this_thread;
 use hexad_core::control::signals::diagnostic::DiagnosticCode;
 use hexad_core::control::signals::inputs::Measurement;
 use hexad_core::control::signals::state::{Request, State};
@@ -31,12 +31,12 @@ fn way_mm(rig: &mut Rig, mut pass: impl FnMut(&mut Rig)) -> f64 {
     let before = rig.simulator().state().pose.position;
     let speed = rig.simulator().state().twist.linear.norm();
     assert!(SPEED_M_S.contains(&speed), "{speed} m/s");
-    let (mut way, calls) = (0.0f64, calls_of_this_thread());
+    let (mut way, calls) = (0.0f64, allocator_calls_of_this_thread());
     for _ in 0..150 {
         pass(rig);
         way = way.max((rig.simulator().state().pose.position - before).norm() * 1e3);
     }
-    assert_eq!(calls_of_this_thread() - calls, 0, "no cycle allocates");
+    assert_eq!(allocator_calls_of_this_thread() - calls, 0, "no cycle allocates");
     let rest = rig.simulator().state().twist.linear.norm();
     assert_eq!(rest, 0.0, "the platform rests");
     println!("{way:.2} mm at {speed:.2} m/s");

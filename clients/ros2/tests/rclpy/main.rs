@@ -114,7 +114,7 @@ const LIMIT: &str = "[setpoint]\non_violation = \"limit\"\n";
 fn rclpy_reads_the_state_and_moves_the_platform_with_poses() {
     let _alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let Some(mut cell) = Cell::open("poses", LIMIT) else { return };
-    cell.start_node(Host::Stranger, "stranger");
+    cell.start_node(Host::UntrustedDaemon, "stranger");
     if !cell.reaches("poses", "end of poses") {
         return;
     }

@@ -16,7 +16,7 @@ pub fn fifo_priority(priority: i32) -> Result<(), Shortfall> {
 }
 
 /// Puts the calling thread back under the ordinary policy, which is always permitted.
-pub fn ordinary_priority() {
+pub fn set_ordinary_policy() {
     set_policy(libc::SCHED_OTHER, 0);
 }
 

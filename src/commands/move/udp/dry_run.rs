@@ -10,14 +10,14 @@ use super::receiver::{Arrived, Receiver, SILENCE_CAUSES};
 use super::stream::{BLEND_S, StreamOptions, blended};
 use super::survey::StreamSurvey;
 use crate::commands::failure::Failure;
-use crate::commands::progress::time_bar;
+use crate::commands::progress::millisecond_bar;
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::reference::ReferenceGenerator;
 use hexad_core::control::setpoint::pose_samples::PoseSamples;
 use hexad_core::control::setpoint::target::Target;
 use hexad_core::control::signals::limits::{Limit, LimitSet};
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::rigid::{Acceleration, Motion, Twist};
 use hexad_core::model::task::{pose_of, task_coordinates};
 use hexad_daemon::constants;
@@ -53,7 +53,7 @@ pub fn run(
     let mut survey = StreamSurvey::over(duration_s);
     arrived.iter().for_each(|it| survey.add(&constants, it.arrival_ns, &it.x));
     let [low, high] = survey.range.unwrap_or_default();
-    let span_s = seconds_since(first.arrival_ns, last.arrival_ns);
+    let span_s = seconds_since_or_0(first.arrival_ns, last.arrival_ns);
     let mut text = format!("{} in {span_s:.1} s, {}\n", receiver.description(), timing(&arrived));
     let format = CoordinateFormat::new(MotionUnits::default(), config.resolution());
     text += &format.table("about home", &[("lowest", Some(low), 0), ("highest", Some(high), 0)]);
@@ -79,7 +79,7 @@ pub fn run(
 
 fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived> {
     let (mut began, mut arrived, mut was_silent) = (Instant::now(), vec![], true);
-    let bar = time_bar(duration_s);
+    let bar = millisecond_bar(duration_s);
     while !stop.is_requested() && began.elapsed().as_secs_f64() < duration_s {
         bar.set_position(began.elapsed().as_millis() as u64);
         sleep(POLL_INTERVAL);
@@ -97,8 +97,8 @@ fn receive(receiver: &mut Receiver, duration_s: f64, stop: &Stop) -> Vec<Arrived
 /// Rate, losses and ages. A pose is missing where the stamps leave room for one.
 fn timing(arrived: &[Arrived]) -> String {
     let steps = arrived.iter().zip(arrived.iter().skip(1));
-    let mut steps: Vec<_> = steps.map(|(a, b)| seconds_since(a.time_ns, b.time_ns)).collect();
-    let mut ages: Vec<_> = arrived.iter().map(|it| seconds_since(it.time_ns, it.arrival_ns)).collect();
+    let mut steps: Vec<_> = steps.map(|(a, b)| seconds_since_or_0(a.time_ns, b.time_ns)).collect();
+    let mut ages: Vec<_> = arrived.iter().map(|it| seconds_since_or_0(it.time_ns, it.arrival_ns)).collect();
     steps.sort_by(f64::total_cmp);
     ages.sort_by(f64::total_cmp);
     let at = |sorted: &[f64], share: f64| {
@@ -150,7 +150,7 @@ impl Followed {
         let (cycles, limits) = (vec![], LimitSet::default());
         // The start from rest, in which nobody sees the interval of the poses yet, counts as little as it lasts.
         let last_ns = arrived.last().map_or(0, |it| it.arrival_ns);
-        let after_s = BLEND_S.min(0.5 * seconds_since(first_ns, last_ns));
+        let after_s = BLEND_S.min(0.5 * seconds_since_or_0(first_ns, last_ns));
         let mut followed = Self { cycles, deviation: [0.0; 2], delay_s: 0.0, counted: 0, limited: 0, limits };
         while waiting.peek().is_some() {
             while let Some(it) = waiting.next_if(|it| it.arrival_ns <= now_ns) {
@@ -158,7 +158,13 @@ impl Followed {
                 samples.push(now_ns, it.time_ns, &pose_of(&x));
             }
             reference.advance(&constants, now_ns, Some(&Target::Samples(&samples)));
-            followed.add(seconds_since(first_ns, now_ns), &reference, samples.target(now_ns), &home, after_s);
+            followed.add(
+                seconds_since_or_0(first_ns, now_ns),
+                &reference,
+                samples.target(now_ns),
+                &home,
+                after_s,
+            );
             now_ns += period_ns;
         }
         followed.delay_s = samples.delay_s(now_ns);

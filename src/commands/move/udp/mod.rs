@@ -30,7 +30,7 @@ use hexad_client::realtime::pause_signals::PauseRequest;
 use hexad_client::realtime::stop_request::Stop;
 use hexad_core::control::constants::Constants;
 use hexad_core::control::parameters::ViolationPolicy;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::task::pose_of;
 use hexad_daemon::constants;
 use hexad_daemon::target_source::{TargetError, TargetSource, is_reached, other_source};
@@ -96,7 +96,7 @@ pub fn follow(
         return Ok(());
     }
     // The daemon goes on to the last target.
-    let rest = ride.source.resting_x(&constants)?;
+    let rest = ride.source.resting_or_present_x(&constants)?;
     (0..LAST_TARGETS).try_for_each(|_| ride.source.publish(rest))?;
     Err(MotionError::Interrupted.into())
 }
@@ -179,7 +179,7 @@ impl Ride<'_> {
                     self.board(RESTARTED);
                 } else if self.receiver.is_alive(now_ns) {
                     self.phase = Phase::following(x);
-                } else if seconds_since(since_ns, now_ns) > LONG_PAUSE_S {
+                } else if seconds_since_or_0(since_ns, now_ns) > LONG_PAUSE_S {
                     self.board("a long pause");
                 }
             }
@@ -215,7 +215,7 @@ impl Ride<'_> {
     /// Comes to rest, on the way to the boarding pose or in a ride.
     fn pause(&mut self, rides: bool, now_ns: u64) -> Result<(), TargetError> {
         info!("a pause: the platform comes to rest");
-        let x = self.source.resting_x(self.constants)?;
+        let x = self.source.resting_or_present_x(self.constants)?;
         self.phase = Phase::Pause { x, since_ns: now_ns, rides };
         Ok(())
     }

@@ -10,7 +10,7 @@ use super::stream::{StreamOptions, blended};
 use crate::commands::failure::Failure;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::messages::source_clock::SourceClock;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::task::pose_of;
 use hexad_machine::config::Config;
 
@@ -161,7 +161,7 @@ impl Receiver {
         // A program that is started again has another port. Some have another for each datagram.
         let (before, count) = self.sender.unwrap_or((sender, 0));
         let is_restart = before != sender && count > 1;
-        if is_restart && seconds_since(self.heard_ns, arrival_ns) <= self.pause_s {
+        if is_restart && seconds_since_or_0(self.heard_ns, arrival_ns) <= self.pause_s {
             return Err(Rejection::Second(sender, before));
         }
         self.sender = Some((sender, if before == sender { count.saturating_add(1) } else { 1 }));
@@ -184,7 +184,7 @@ impl Receiver {
     }
 
     pub fn silence_s(&self, now_ns: u64) -> f64 {
-        seconds_since(self.last_ns, now_ns)
+        seconds_since_or_0(self.last_ns, now_ns)
     }
 
     pub fn is_alive(&self, now_ns: u64) -> bool {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use crate::commands::request::carry_out_in_background;
 use hexad_client::messages::clock::monotonic_ns;
 use hexad_client::operator::protocol::AnswerLine as Answer;
-use hexad_client::operator::requests::{StopBaseline, status_for_source};
+use hexad_client::operator::requests::{StopBaseline, request_status_as_source};
 use hexad_client::operator::ride::{RideOrder, RidePhase};
 use hexad_client::operator::{OperatorError, Order};
 use hexad_client::realtime::stop_request::Stop;
@@ -63,7 +63,7 @@ impl StatusFeed {
                     let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
                     (shared.input.take(), shared.phase)
                 };
-                let answer = status_for_source(&name, input, phase);
+                let answer = request_status_as_source(&name, input, phase);
                 let order = phase.zip(answer.as_ref().ok().and_then(order_for_this_process));
                 shared.lock().unwrap_or_else(PoisonError::into_inner).receive(
                     requested_ns,

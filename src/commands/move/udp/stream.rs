@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::commands::quantity::{angle, length, list};
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::motion::minimum_jerk::{rise, straight_move};
 
 /// Duration of the blend from the pose at which the platform stands to the stream \[s\].
@@ -37,5 +37,7 @@ fn boarding(text: &str) -> Result<[f64; 6], String> {
 
 /// A pose of the stream, blended from the pose at which the platform stood.
 pub fn blended(from: &[f64; 6], to: &[f64; 6], since_ns: u64, now_ns: u64) -> [f64; 6] {
-    straight_move(&(*from).into(), &(*to).into(), &rise(seconds_since(since_ns, now_ns), BLEND_S)).x.into()
+    straight_move(&(*from).into(), &(*to).into(), &rise(seconds_since_or_0(since_ns, now_ns), BLEND_S))
+        .x
+        .into()
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector6;
 
 use hexad_core::control::constants::Constants;
-use hexad_core::control::signals::time::seconds_since;
+use hexad_core::control::signals::time::seconds_since_or_0;
 use hexad_core::model::rigid::Twist;
 use hexad_core::model::task::pose_of;
 use hexad_machine::analysis::target_motion::{ExceededBound, check_target};
@@ -56,7 +56,7 @@ impl StreamSurvey {
         self.range = Some([low.inf(&new).into(), high.sup(&new).into()]);
         let before = self.last.replace((arrival_ns, *x));
         if let Some((before_ns, _)) = before {
-            let kept = (-seconds_since(before_ns, arrival_ns) / self.memory_s).exp();
+            let kept = (-seconds_since_or_0(before_ns, arrival_ns) / self.memory_s).exp();
             for sum in [&mut self.poses, &mut self.outside, &mut self.way, &mut self.angle, &mut self.time_s]
             {
                 *sum *= kept;
@@ -67,7 +67,7 @@ impl StreamSurvey {
             (self.outside, self.bound) = (self.outside + 1.0, Some(bound));
         }
         if let Some((before_ns, before)) = before {
-            let step_s = seconds_since(before_ns, arrival_ns);
+            let step_s = seconds_since_or_0(before_ns, arrival_ns);
             if step_s < MAX_STEP_S {
                 let Twist { angular, linear } = pose_of(&before).displacement_to(&pose_of(x));
                 (self.way, self.angle) = (self.way + linear.norm(), self.angle + angular.norm());

@@ -24,7 +24,7 @@ pub(in crate::control) fn actuate(
     let constants = cycle.constants;
     let parameters = &constants.parameters;
     let estimator = errors.estimator();
-    let mut at_begin = *estimator.at_measurement();
+    let mut at_begin = *estimator.estimate_at_last_measurement();
     estimator.predict(&mut at_begin, begin_ns);
     let wanted = parameters.law.commanded_acceleration(&at_begin, &constants.acceleration_by_command);
     let acceleration = feedback.limit(cycle, &desired.acceleration, &wanted);

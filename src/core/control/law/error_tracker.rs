@@ -90,13 +90,13 @@ impl ErrorTracker {
         let innovation = estimator.correct(&constants.estimator, time_ns, &deviation);
         let is_new = innovation.is_some();
         if let Some(innovation) = innovation {
-            self.post_fit_residual = deviation.value - estimator.at_measurement().value;
+            self.post_fit_residual = deviation.value - estimator.estimate_at_last_measurement().value;
             let legs = || {
                 let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
                 [leg_lengths(constants.machine(), &desired.pose), feedback]
             };
             let EstimatorConstants { reading_errors, .. } = &constants.estimator;
-            let disturbance_now = &estimator.at_measurement().disturbance_acceleration;
+            let disturbance_now = &estimator.estimate_at_last_measurement().disturbance_acceleration;
             let mut check = || {
                 sensors.check(&located.measurement.length_m, reading_errors, &constants.frozen_leg, legs)?;
                 check_innovation(constants, &innovation, interval_s, located)?;
@@ -110,7 +110,7 @@ impl ErrorTracker {
             self.disturbance_diagnostic = disturbance
                 .check(
                     &constants.disturbance_bounds,
-                    estimator.at_measurement(),
+                    estimator.estimate_at_last_measurement(),
                     &desired,
                     (&drives.sudden_acceleration, friction),
                     interval_s,
@@ -120,7 +120,7 @@ impl ErrorTracker {
         let mut twist = located.platform.twist;
         // A measurement from before the start of control shows another motion.
         if located.measurement.rate_m_s.is_none() && interval_s >= 0.0 {
-            let rate = &estimator.at_measurement().rate;
+            let rate = &estimator.estimate_at_last_measurement().rate;
             error.twist = if acts_on_legs {
                 localization.twist_of(constants, rate).unwrap_or(error.twist)
             } else {
@@ -132,7 +132,7 @@ impl ErrorTracker {
         if is_new {
             self.error = error;
         } else if !acts_on_legs {
-            let mut predicted = *estimator.at_measurement();
+            let mut predicted = *estimator.estimate_at_last_measurement();
             estimator.predict(&mut predicted, cycle.release_ns);
             self.error = PoseError::from(&predicted.error());
         }
@@ -194,7 +194,7 @@ fn feedback_forces(
         true => *acceleration,
         false => leg_wrenches(constants.machine(), pose).tr_mul(acceleration),
     };
-    law.forces_of_leg_accelerations(&LegAccelerations(of_legs))
+    law.uncoupled_leg_forces(&LegAccelerations(of_legs))
 }
 
 /// Checks each leg's innovation against its bound. The innovation of a leg is `N^T nu`, at most
@@ -205,7 +205,7 @@ fn check_innovation(
     interval_s: f64,
     located: &Located<'_>,
 ) -> Result<(), Diagnostic> {
-    let bound = constants.estimator.innovation_bound(interval_s);
+    let bound = constants.estimator.innovation_bound_m(interval_s);
     let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
     let Twist { angular, linear } = Twist::from_vector(innovation);
     let largest =

@@ -172,10 +172,7 @@ impl Law {
     }
 
     /// Drive forces `m_i a_i` for leg accelerations, with the effective mass of each drive.
-    pub fn forces_of_leg_accelerations(
-        &self,
-        LegAccelerations(acceleration): &LegAccelerations,
-    ) -> [f64; LEGS] {
+    pub fn uncoupled_leg_forces(&self, LegAccelerations(acceleration): &LegAccelerations) -> [f64; LEGS] {
         acceleration.component_mul(&self.leg_masses.mass_kg).into()
     }
 }

@@ -23,7 +23,7 @@ pub(in crate::control) fn forces(
         ControlMode::JointPd => None,
     };
     let mut force = match law.mode.acts_on_legs() {
-        true => law.forces_of_leg_accelerations(&LegAccelerations(acceleration.0)),
+        true => law.uncoupled_leg_forces(&LegAccelerations(acceleration.0)),
         false => [0.0; LEGS],
     };
     if let Some(fidelity) = fidelity {

@@ -23,9 +23,9 @@ pub struct LegMasses {
     /// `m_i` \[kg\].
     pub mass_kg: Vector6<f64>,
     /// Smallest loop gain of a mode, relative to the law's loop gain.
-    pub softest_mode_gain: f64,
+    pub softest_mode_gain_ratio: f64,
     /// Largest loop gain of a mode, relative to the law's loop gain; it decides the stability of the loop.
-    pub stiffest_mode_gain: f64,
+    pub stiffest_mode_gain_ratio: f64,
 }
 
 impl LegMasses {
@@ -38,9 +38,9 @@ impl LegMasses {
         let coupled = roots * mobility * roots;
         // The eigenvalue iteration does not end if an element is not finite.
         if !coupled.iter().all(|element| element.is_finite()) {
-            return Self { mass_kg, softest_mode_gain: f64::NAN, stiffest_mode_gain: f64::NAN };
+            return Self { mass_kg, softest_mode_gain_ratio: f64::NAN, stiffest_mode_gain_ratio: f64::NAN };
         }
         let gains = coupled.symmetric_eigenvalues();
-        Self { mass_kg, softest_mode_gain: gains.min(), stiffest_mode_gain: gains.max() }
+        Self { mass_kg, softest_mode_gain_ratio: gains.min(), stiffest_mode_gain_ratio: gains.max() }
     }
 }

@@ -127,15 +127,15 @@ impl DisturbanceBounds {
         let friction = FrictionEffects {
             force_n: machine.actuator.friction_uncertainty_n,
             payload_kg_per_n: by_force.tr_mul(&payload_by_disturbance).into(),
-            acceleration_m_s2_per_n: core::array::from_fn(|leg| {
+            swing_acceleration_m_s2_per_n: core::array::from_fn(|leg| {
                 weighted(&by_force.column(leg).into(), arm_m).norm()
             }),
             by_force,
             force_by_disturbance: by_force.try_inverse().unwrap_or_default(),
         };
         let sum = |effects: [f64; LEGS]| friction.force_n * effects.into_iter().map(f64::abs).sum::<f64>();
-        let of_one_leg =
-            friction.force_n * friction.acceleration_m_s2_per_n.into_iter().fold(f64::INFINITY, f64::min);
+        let of_one_leg = friction.force_n
+            * friction.swing_acceleration_m_s2_per_n.into_iter().fold(f64::INFINITY, f64::min);
         let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass_kg)
             .max(DEFAULT_PAYLOAD_CHANGE_PER_FRICTION * sum(friction.payload_kg_per_n));
         let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT
@@ -226,7 +226,7 @@ impl DisturbanceMonitor {
     ) -> Result<(), Diagnostic> {
         self.since_start_s += dt_s;
         self.removed_acceleration *= 1.0 - (dt_s / CUT_FORCE_DECAY_TIME_CONSTANT_S).min(1.0);
-        let by_friction = friction.payload_changes(&bounds.friction);
+        let by_friction = friction.payload_change_range_kg(&bounds.friction);
         let payload = self.check_payload(
             bounds,
             &estimate.disturbance_acceleration,

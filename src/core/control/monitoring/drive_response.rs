@@ -98,7 +98,7 @@ impl DriveResponse {
         let along = by_force.tr_mul(sudden);
         let squares = by_force.component_mul(&by_force).tr_mul(&Vector6::repeat(1.0));
         let least = LEAST_COSINE_SQUARED * sudden.norm_squared();
-        let max_force = constants.machine().actuator.available_force();
+        let max_force = constants.machine().actuator.weakest_available_force_n();
         let mut missing = None;
         let forces = sent.iter().zip(&self.usual_force);
         for (leg, ((along, square), (sent, usual))) in along.iter().zip(&squares).zip(forces).enumerate() {

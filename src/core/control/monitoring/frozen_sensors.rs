@@ -55,8 +55,8 @@ impl ReadingErrors {
     /// Equal readings in a row that noise permits; `None` if the noise is less than a step or the step is
     /// unknown.
     fn max_equal_readings(&self) -> Option<f64> {
-        let steps = self.deviation_m / self.resolution_m;
-        (self.resolution_m > 0.0 && steps >= 1.0)
+        let steps = self.deviation_m / self.resolution_or_0_m;
+        (self.resolution_or_0_m > 0.0 && steps >= 1.0)
             .then(|| (MAX_EQUAL_AT_ONE_STEP / (steps * steps)).max(MAX_EQUAL_NOISY_READINGS))
     }
 }
@@ -168,7 +168,8 @@ impl FrozenSensors {
     ) -> Result<(), Diagnostic> {
         let are_all_equal = self.equal_readings.iter().all(|equal| *equal + 1 >= MIN_EQUAL_READINGS);
         let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion_m };
-        let resolution = if errors.resolution_m > 0.0 { errors.resolution_m } else { self.largest_step() };
+        let resolution =
+            if errors.resolution_or_0_m > 0.0 { errors.resolution_or_0_m } else { self.largest_step() };
         let bound = (bound + resolution).max(MIN_BOUND_SENSOR_STEPS * resolution);
         let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * resolution);
         let mut result = Ok(());
@@ -191,7 +192,8 @@ impl FrozenSensors {
             let repeats = |most| f64::from(*equal + 1) > most;
             if errors.max_equal_readings().is_some_and(repeats) && result.is_ok() {
                 result =
-                    Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution_m).at(leg));
+                    Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution_or_0_m)
+                        .at(leg));
             }
         }
         result
@@ -208,10 +210,10 @@ mod tests {
     fn check(
         sensors: &mut FrozenSensors,
         length: [f64; LEGS],
-        [deviation_m, resolution_m]: [f64; 2],
+        [deviation_m, resolution_or_0_m]: [f64; 2],
         legs: [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
-        sensors.check(&length, &ReadingErrors { deviation_m, resolution_m }, &BOUNDS, || legs)
+        sensors.check(&length, &ReadingErrors { deviation_m, resolution_or_0_m }, &BOUNDS, || legs)
     }
 
     /// Readings of a crawling leg that does not move while the feedback force on it grows to `newtons`.

@@ -38,7 +38,7 @@ pub struct FrictionEffects {
     /// Change of payload by a force of each leg \[kg/N\].
     pub payload_kg_per_n: [f64; LEGS],
     /// Largest acceleration that swings the platform by a force of one leg, its angles weighted \[m/s^2/N\].
-    pub acceleration_m_s2_per_n: [f64; LEGS],
+    pub swing_acceleration_m_s2_per_n: [f64; LEGS],
     /// b_i, in error coordinates, and the inverse.
     pub by_force: Matrix6<f64>,
     /// Forces of the legs that explain a disturbance.
@@ -82,7 +82,7 @@ impl UnstatedFriction {
     }
 
     /// Least and largest change of payload that friction may explain \[kg\].
-    pub fn payload_changes(&self, effects: &FrictionEffects) -> [f64; 2] {
+    pub fn payload_change_range_kg(&self, effects: &FrictionEffects) -> [f64; 2] {
         let forces = self.forces(effects.force_n, &self.unusual);
         forces.iter().zip(&effects.payload_kg_per_n).fold([0.0; 2], |[least, most], ([low, high], effect)| {
             let (low, high) = (low * effect, high * effect);
@@ -104,7 +104,7 @@ impl UnstatedFriction {
 
     /// Acceleration with which friction may swing the platform \[m/s^2\].
     pub fn swing_acceleration(&self, effects: &FrictionEffects) -> f64 {
-        let legs = self.unusual.iter().zip(&effects.acceleration_m_s2_per_n);
+        let legs = self.unusual.iter().zip(&effects.swing_acceleration_m_s2_per_n);
         effects.force_n * legs.map(|(share, effect)| share * effect).sum::<f64>()
     }
 }
@@ -116,7 +116,7 @@ mod tests {
     const EFFECTS: FrictionEffects = FrictionEffects {
         force_n: 10.0,
         payload_kg_per_n: [0.1; LEGS],
-        acceleration_m_s2_per_n: [0.2; LEGS],
+        swing_acceleration_m_s2_per_n: [0.2; LEGS],
         by_force: Matrix6::new(
             1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
             0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0,
@@ -136,12 +136,12 @@ mod tests {
             friction
         };
         let is_near = |found: f64, expected: f64| (found - expected).abs() < 0.01;
-        let [least, most] = play(0.01, 0.001).payload_changes(&EFFECTS);
+        let [least, most] = play(0.01, 0.001).payload_change_range_kg(&EFFECTS);
         assert!(least == 0.0 && is_near(most, 14.4), "all legs begin to move: {least} {most}");
-        let [_, most] = play(0.01, 10.0).payload_changes(&EFFECTS);
+        let [_, most] = play(0.01, 10.0).payload_change_range_kg(&EFFECTS);
         assert!(most < 1e-2, "all move one way");
         let turned = play(-0.01, 0.001);
-        let [least, _] = turned.payload_changes(&EFFECTS);
+        let [least, _] = turned.payload_change_range_kg(&EFFECTS);
         assert!(is_near(least, -2.4), "one turns around: {least}");
         let unexplained = |x: f64, y: f64| {
             let rest = turned.unexplained(&EFFECTS, &Vector6::new(x, y, 0.0, 0.0, 0.0, 0.0));
@@ -150,7 +150,7 @@ mod tests {
         assert_eq!([unexplained(23.0, 0.0), unexplained(-23.0, 0.0)], [[23.0, 0.0], [0.0, 0.0]]);
         let [x, y] = unexplained(-29.0, 3.0);
         assert!(is_near(x, -5.0) && is_near(y, 3.0), "{x} {y}");
-        let [least, most] = play(-5e-5, 5.0).payload_changes(&EFFECTS);
+        let [least, most] = play(-5e-5, 5.0).payload_change_range_kg(&EFFECTS);
         assert!(is_near(least, -2.4) && is_near(most, 2.4), "it may stick while others move: {least} {most}");
     }
 
@@ -158,7 +158,7 @@ mod tests {
     fn a_platform_at_rest_has_no_friction_that_changes() {
         let mut friction = UnstatedFriction::default();
         (0..10_000).for_each(|_| friction.update(&[1e-9; LEGS], 1e-3));
-        assert_eq!(friction.payload_changes(&EFFECTS), [0.0; 2]);
+        assert_eq!(friction.payload_change_range_kg(&EFFECTS), [0.0; 2]);
         assert_eq!(friction.swing_acceleration(&EFFECTS), 0.0);
         let sudden = Vector6::repeat(1.0);
         assert_eq!(friction.unexplained(&EFFECTS, &sudden), sudden);

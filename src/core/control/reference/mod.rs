@@ -197,7 +197,8 @@ impl ReferenceGenerator {
     /// Whether an acceleration is within the strength. Until it is, the stop brakes with more, whatever the
     /// strength: a further reduction would not help this proof, and only make later stops longer.
     fn does_strength_act(&self, constants: &Constants, present: &Acceleration) -> bool {
-        let limits = constants.parameters.limits.with_accelerations_scaled(NOTABLE_RATIO * self.strength);
+        let limits =
+            constants.parameters.limits.scaled_at_equal_stopping_distance(NOTABLE_RATIO * self.strength);
         present.linear.norm() <= limits.position.acceleration
             && present.angular.norm() <= limits.orientation.acceleration
     }

@@ -23,9 +23,9 @@ use serde::{Deserialize, Serialize};
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::sensing::localization::{Localization, Located, PlatformState};
-use crate::control::sensing::standstill::{Standstill, standing_speed};
+use crate::control::sensing::standstill::{Standstill, max_standing_speed_m_s};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::limits::largest_ratio;
+use crate::control::signals::limits::largest_ratio_or_nan;
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
@@ -110,7 +110,7 @@ impl FreeMotion {
         localization: &Localization,
         pose: &Pose,
     ) -> Result<Motion, Diagnostic> {
-        let largest = standing_speed(&constants.parameters);
+        let largest = max_standing_speed_m_s(&constants.parameters);
         let found = self.standstill.latest();
         let speed = found.map_or(f64::INFINITY, |rates| {
             let twist = localization.twist_of(constants, &rates.rate_m_s.into());
@@ -125,7 +125,7 @@ impl FreeMotion {
 
     fn at(&self, constants: &Constants, instant_ns: u64) -> Option<Motion> {
         let last = self.last?;
-        let standing = standing_speed(&constants.parameters);
+        let standing = max_standing_speed_m_s(&constants.parameters);
         let change = match self.before {
             Some(before) => (last.speed - before.speed) / seconds_between(before.time_ns, last.time_ns),
             None if last.speed <= standing => 0.0,
@@ -137,7 +137,7 @@ impl FreeMotion {
         let scaled = |factor: f64| Twist::from_vector(&(last.twist.vector() * factor));
         let limits = constants.parameters.unscaled_limits();
         let in_period = scaled(change / last.speed * constants.parameters.period_ns as f64 * 1e-9);
-        let change_ratio = largest_ratio([
+        let change_ratio = largest_ratio_or_nan([
             in_period.linear.norm() / limits.position.velocity,
             in_period.angular.norm() / limits.orientation.velocity,
         ]);

@@ -120,7 +120,7 @@ impl MeasurementValidator {
         (self.released_before_ns, self.released_ns) = (self.released_ns, cycle.release_ns);
         let continuity = self.check_input_continuity(cycle);
         let fault = newest.map_or(0, |newest| newest.drives.fault.unwrap_or_default());
-        let has_bus_failed = fault & DriveStatus::BUS_FAILED != 0;
+        let has_bus_failed = fault & DriveStatus::BUS_FAILED_BIT != 0;
         let new = newest.filter(|newest| !has_bus_failed && self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
         self.cycles_without_valid += u64::from(cycle.state.has_control() && !is_accepted);

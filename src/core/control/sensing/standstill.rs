@@ -41,7 +41,7 @@ const SCATTER_DEVIATIONS: f64 = 10.0;
 const STANDING_RATIO: f64 = 1e-3;
 
 /// Largest speed of a joint at which the platform counts as standing \[m/s\].
-pub(in crate::control) fn standing_speed(parameters: &Parameters) -> f64 {
+pub(in crate::control) fn max_standing_speed_m_s(parameters: &Parameters) -> f64 {
     STANDING_RATIO * parameters.unscaled_limits().position.velocity
 }
 
@@ -49,7 +49,7 @@ pub(in crate::control) fn standing_speed(parameters: &Parameters) -> f64 {
 ///
 /// With n = T / period measurements, evenly spread, the deviation of the slope is `s sqrt(12 / n) / T`.
 pub(in crate::control) fn window_s(parameters: &Parameters) -> f64 {
-    let allowed = NOISE_SHARE * standing_speed(parameters) / DEVIATIONS;
+    let allowed = NOISE_SHARE * max_standing_speed_m_s(parameters) / DEVIATIONS;
     let needed = parameters.reading_errors.deviation_m * (12.0 * parameters.period_s()).sqrt() / allowed;
     libm::cbrt(needed * needed).max(MIN_WINDOW_S)
 }
@@ -139,8 +139,8 @@ impl Standstill {
         if self.rates.is_some_and(|rates| {
             moved
                 > SCATTER_DEVIATIONS * rates.scatter
-                    + standing_speed(parameters) * t
-                    + parameters.reading_errors.resolution_m
+                    + max_standing_speed_m_s(parameters) * t
+                    + parameters.reading_errors.resolution_or_0_m
         }) {
             (self.window, self.rates) = (Some(Window::new(measurement)), None);
         } else if t >= window_s {

@@ -93,7 +93,7 @@ impl<'a> Target<'a> {
         strength_share: f64,
         present: &Acceleration,
     ) -> Limits {
-        let strong = limits.with_accelerations_scaled(strength_share);
+        let strong = limits.scaled_at_equal_stopping_distance(strength_share);
         let Self::Pose { speed_share, .. } = self else { return strong };
         let mut share = limits.scaled(limits.autonomous_scale * speed_share);
         for (share, strong, present) in [

@@ -31,7 +31,7 @@ use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Input, Setpoint, SetpointKind};
-use crate::control::signals::limits::{Limit, LimitSet, Limits, largest_ratio};
+use crate::control::signals::limits::{Limit, LimitSet, Limits, largest_ratio_or_nan};
 use crate::control::signals::state::{AfterStop, State};
 use crate::control::signals::time::seconds_between;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
@@ -270,9 +270,11 @@ fn check_velocity_and_acceleration(
 ) -> Result<(), Diagnostic> {
     let Motion { twist, acceleration, .. } = motion;
     let Limits { orientation, position, .. } = &parameters.limits;
-    let velocity =
-        largest_ratio([twist.angular.norm() / orientation.velocity, twist.linear.norm() / position.velocity]);
-    let acceleration = largest_ratio([
+    let velocity = largest_ratio_or_nan([
+        twist.angular.norm() / orientation.velocity,
+        twist.linear.norm() / position.velocity,
+    ]);
+    let acceleration = largest_ratio_or_nan([
         acceleration.angular.norm() / orientation.acceleration,
         acceleration.linear.norm() / position.acceleration,
     ]);

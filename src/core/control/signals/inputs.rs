@@ -86,7 +86,7 @@ pub struct DriveStatus {
     pub enabled: Option<u32>,
     /// Set of open brakes; `None` if not reported.
     pub brake_open: Option<u32>,
-    /// Set of drives with a fault, and [`DriveStatus::BUS_FAILED`]; `None` if not reported.
+    /// Set of drives with a fault, and [`DriveStatus::BUS_FAILED_BIT`]; `None` if not reported.
     pub fault: Option<u32>,
     /// Actual forces \[N\]; `None` if not reported.
     pub force_n: Option<[f64; LEGS]>,
@@ -94,7 +94,7 @@ pub struct DriveStatus {
 
 impl DriveStatus {
     /// Bit of `fault` of a driver whose bus to the drives failed: the lengths beside it are no measurement.
-    pub const BUS_FAILED: u32 = 1 << LEGS;
+    pub const BUS_FAILED_BIT: u32 = 1 << LEGS;
 
     /// The first drive that is not enabled, or whose brake is closed.
     pub(in crate::control) fn first_unready_leg(&self) -> Option<usize> {
@@ -114,7 +114,7 @@ pub struct Publishers {
     /// Process whose messages are used.
     pub used_pid: u32,
     /// Process whose messages are ignored.
-    pub ignored_pid: u32,
+    pub ignored_pid_or_0: u32,
 }
 
 /// Inputs of one cycle. Together with the state of the controller they determine its output.
@@ -137,7 +137,7 @@ pub struct Input {
     /// Number of other poses with the measured leg lengths that the joints permit; [`Input::SEARCHING`] during their search.
     pub other_poses: u32,
     /// Whether cycles were missed since the last one, and the deployment treats that as a fault.
-    pub overrun_is_fault: bool,
+    pub had_faulty_overrun: bool,
 }
 
 impl Input {

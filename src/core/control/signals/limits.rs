@@ -62,7 +62,7 @@ pub struct LimitSet(pub u32);
 
 /// Largest of several ratios of a quantity to its bound. NaN if any ratio is NaN; `f64::max` would hide it
 /// and a check would pass.
-pub fn largest_ratio<const N: usize>(ratios: [f64; N]) -> f64 {
+pub fn largest_ratio_or_nan<const N: usize>(ratios: [f64; N]) -> f64 {
     let larger =
         |largest: f64, ratio: f64| if largest.is_nan() || ratio <= largest { largest } else { ratio };
     ratios.into_iter().fold(0.0, larger)
@@ -124,7 +124,7 @@ impl Limits {
 
 impl Limits {
     /// Accelerations times a factor, and the velocities that are stopped within the same distance.
-    pub fn with_accelerations_scaled(&self, scale: f64) -> Self {
+    pub fn scaled_at_equal_stopping_distance(&self, scale: f64) -> Self {
         let scaled = |limits: &DerivativeLimits| DerivativeLimits {
             velocity: scale.sqrt() * limits.velocity,
             acceleration: scale * limits.acceleration,

@@ -11,7 +11,7 @@ use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Input, Publishers, SetpointKind};
-use crate::control::signals::limits::{Limit, LimitSet, largest_ratio};
+use crate::control::signals::limits::{Limit, LimitSet, largest_ratio_or_nan};
 use crate::control::signals::state::State;
 use crate::control::supervision::supervisor::Findings;
 
@@ -148,7 +148,7 @@ fn has_ended(
         && setpoint.follow_check.is_ok()
         && let Some(target) = &setpoint.target
     {
-        return has_arrived(ratio(target), parameters.on_violation, cycle.release_ns, near_since_ns);
+        return update_arrival(ratio(target), parameters.on_violation, cycle.release_ns, near_since_ns);
     }
     *near_since_ns = None;
     match cycle.state {
@@ -163,7 +163,7 @@ fn has_ended(
 
 /// Whether an engaging platform is on its target, or has been near it for long enough. `ratio` is the deviation of the
 /// reference from the target over the engage tolerance.
-pub(in crate::control) fn has_arrived(
+pub(in crate::control) fn update_arrival(
     ratio: f64,
     policy: ViolationPolicy,
     now_ns: u64,
@@ -194,8 +194,12 @@ fn check_engage_tolerance(
 /// Whether an input has no second publisher. Control does not begin with two, because it is unknown which one
 /// is right.
 fn check_no_second_publisher(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
-    let Publishers { used_pid, ignored_pid } = publishers;
-    if ignored_pid == 0 { Ok(()) } else { Err(Diagnostic::new(code, used_pid.into(), ignored_pid.into())) }
+    let Publishers { used_pid, ignored_pid_or_0 } = publishers;
+    if ignored_pid_or_0 == 0 {
+        Ok(())
+    } else {
+        Err(Diagnostic::new(code, used_pid.into(), ignored_pid_or_0.into()))
+    }
 }
 
 /// Whether the platform can be in no other pose than the one that was found.
@@ -223,14 +227,14 @@ fn check_following_error(
     let Some(PoseError { pose, twist }) = error else { return Ok(()) };
     let Parameters { following_position_m, following_orientation_rad, .. } = parameters;
     let Parameters { following_velocity_m_s, following_angular_velocity_rad_s, .. } = parameters;
-    let ratio = largest_ratio([
+    let ratio = largest_ratio_or_nan([
         pose.linear.norm() / following_position_m,
         pose.angular.norm() / following_orientation_rad,
     ]);
     if !active.check(Limit::Following, ratio) {
         return Err(Diagnostic::new(DiagnosticCode::FollowingError, ratio, 1.0));
     }
-    let ratio = largest_ratio([
+    let ratio = largest_ratio_or_nan([
         twist.linear.norm() / following_velocity_m_s,
         twist.angular.norm() / following_angular_velocity_rad_s,
     ]);
@@ -241,5 +245,5 @@ fn check_following_error(
 }
 
 fn check_deadline(input: &Input) -> Result<(), Diagnostic> {
-    if input.overrun_is_fault { Err(DiagnosticCode::DeadlineMissed.into()) } else { Ok(()) }
+    if input.had_faulty_overrun { Err(DiagnosticCode::DeadlineMissed.into()) } else { Ok(()) }
 }

@@ -1,7 +1,7 @@
 //! Tests of the assessment of a cycle: each finding alone decides.
 
 use crate::control::controller::verify_start;
-use crate::control::supervision::assessment::{Evidence, assess, has_arrived};
+use crate::control::supervision::assessment::{Evidence, assess, update_arrival};
 use crate::control::supervision::supervisor::Findings;
 use crate::control::tests::*;
 
@@ -119,7 +119,7 @@ fn each_finding_alone_ends_the_tracking() {
         let far = Some(error(0, 0.06));
         let both = Scene { disturbance_diagnostic: impact, error: far, ..Scene::default() };
         assert_eq!(both.tracking(state), following);
-        let input = Input { overrun_is_fault: true, ..Input::default() };
+        let input = Input { had_faulty_overrun: true, ..Input::default() };
         let late = Some(DiagnosticCode::DeadlineMissed);
         assert_eq!(Scene { input, ..Scene::default() }.tracking(state), late);
         // A setpoint matters only in states that follow it.
@@ -159,7 +159,7 @@ fn each_finding_alone_prevents_control() {
     assert_eq!(Scene::default().beginning(), [None; 2]);
     let both = |code: DiagnosticCode| [Some(code); 2];
     assert_eq!(Scene { reports: [Ok(()), Err(FOUND)], ..Scene::default() }.beginning(), both(FOUND.code));
-    let two = Publishers { used_pid: 7, ignored_pid: 8 };
+    let two = Publishers { used_pid: 7, ignored_pid_or_0: 8 };
     let input = Input { measured_publishers: two, ..Input::default() };
     let code = DiagnosticCode::TwoMeasuredSources;
     assert_eq!(Scene { input, ..Scene::default() }.beginning(), both(code));
@@ -225,7 +225,7 @@ fn engaging_ends_on_the_setpoint_once_the_drives_are_ready() {
 fn engaging_ends_a_second_after_the_reference_was_near() {
     for (policy, after_leaving) in [(ViolationPolicy::Stop, false), (ViolationPolicy::Limit, true)] {
         let mut since_ns = None;
-        let mut at = |ratio: f64, now_ms: u64| has_arrived(ratio, policy, now_ms * MS, &mut since_ns);
+        let mut at = |ratio: f64, now_ms: u64| update_arrival(ratio, policy, now_ms * MS, &mut since_ns);
         assert!(!at(1.1, 0) && at(0.05, 1) && !at(0.06, 2) && !at(1.0, 1000) && at(1.0, 1001), "{policy:?}");
         assert!(!at(f64::NAN, 0) || policy == ViolationPolicy::Limit);
         assert_eq!((at(1.1, 1002), at(1.0, 1003)), (after_leaving, after_leaving), "{policy:?}");

@@ -33,7 +33,7 @@ fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, 
 fn a_leg_that_leaves_the_prediction_ends_the_trust() {
     let machine = machine(&mut RandomVectors::new(74));
     let constants = Constants::new(&machine, parameters(&machine));
-    let bound = constants.estimator.innovation_bound(1e-3);
+    let bound = constants.estimator.innovation_bound_m(1e-3);
     for axis in 0..3 {
         let direction = Vector3::ith(axis, 1.0);
         let mut unit = Vector6::zeros();

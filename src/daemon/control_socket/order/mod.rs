@@ -21,15 +21,15 @@ const RETRY_INTERVAL_NS: u64 = 100_000_000;
 const ANSWER_LIMIT_NS: u64 = MAX_REQUEST_AGE_NS + 200_000_000;
 
 /// How often a request was posted that overrules this one: of those that end control, the ones of higher precedence.
-pub fn stop_count(word: &RequestWord, request: Request) -> u32 {
-    word.posts_above(request.max(Request::Clear) as u32)
+pub fn overruling_count(word: &RequestWord, request: Request) -> u32 {
+    word.posts_of_higher_precedence(request.max(Request::Clear) as u32)
 }
 
 /// Request of a client, with its options.
 #[derive(Clone, Copy, Debug)]
 pub struct Order {
     pub request: Request,
-    /// [`stop_count`] when it was asked for.
+    /// [`overruling_count`] when it was asked for.
     pub stops_before: u32,
     /// Whether the client is answered only when the request is completed.
     pub waits: bool,
@@ -167,7 +167,7 @@ impl PendingOrder {
     /// Whether a request that ends control was posted since it was asked for.
     fn is_overruled(&self, word: &RequestWord) -> bool {
         let Order { request, stops_before, .. } = self.order;
-        !is_stop(request) && stops_before != stop_count(word, request)
+        !is_stop(request) && stops_before != overruling_count(word, request)
     }
 
     fn cancel_posted(&self, posted: u64, word: &RequestWord) {

@@ -4,7 +4,7 @@ use super::*;
 
 /// An order for a cycle, with its first answer.
 fn post_for_cycle(request: Request, word: &RequestWord, deadline_ns: u64) -> (PendingOrder, RequestResult) {
-    let (stops_before, cycle_ns) = (stop_count(word, request), Some(7_000_000));
+    let (stops_before, cycle_ns) = (overruling_count(word, request), Some(7_000_000));
     let order = Order { request, stops_before, waits: false, is_patient: false, deadline_ns, cycle_ns };
     let mut pending = PendingOrder::post(order, &Snapshot::default(), word, 1000);
     let first = pending.step(&Snapshot::default(), word, 1000);
@@ -48,7 +48,7 @@ fn post(
     word: &RequestWord,
     now_ns: u64,
 ) -> PendingOrder {
-    let stops_before = stop_count(word, request);
+    let stops_before = overruling_count(word, request);
     let (waits, deadline_ns, cycle_ns) = (true, u64::MAX, None);
     let order = Order { request, stops_before, waits, is_patient, deadline_ns, cycle_ns };
     PendingOrder::post(order, snapshot, word, now_ns)

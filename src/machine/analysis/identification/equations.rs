@@ -17,12 +17,12 @@ use hexad_core::model::machine::Machine;
 use hexad_core::model::regressor::{DYNAMIC_PARAMETER_COUNT, Regressor, regressor};
 
 /// Parameters of a rigid body: mass, first moments, inertia about C.
-pub(super) const BODY: usize = 10;
+pub(super) const BODY_PARAMETER_COUNT: usize = 10;
 /// First of the force scales s, of their products with the load friction, and of the parameters of the payload.
 pub(super) const SCALE: usize = DYNAMIC_PARAMETER_COUNT;
-pub(super) const LOSS: usize = SCALE + LEGS;
-pub(super) const PAYLOAD: usize = LOSS + LEGS;
-pub(super) const UNKNOWNS: usize = PAYLOAD + BODY;
+pub(super) const LOSS_INDEX: usize = SCALE + LEGS;
+pub(super) const PAYLOAD: usize = LOSS_INDEX + LEGS;
+pub(super) const UNKNOWNS: usize = PAYLOAD + BODY_PARAMETER_COUNT;
 
 /// Unknowns of the equations.
 pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
@@ -32,7 +32,7 @@ pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 const STANDING_M_S: f64 = 0.03;
 const STANDING_RATIO: f64 = 0.2;
 /// Successive samples whose means form an equation: 80 ms at 1 kHz, in which noise averages out on both sides alike.
-pub(super) const GROUP: usize = 16;
+pub(super) const SAMPLES_PER_EQUATION: usize = 16;
 
 /// Body on the platform in a recording, beside the platform itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub enum Load {
 
 impl Load {
     /// Parameters of the body, in the order of the platform's parameters in the regressor.
-    pub(super) fn parameters(&self) -> SVector<f64, BODY> {
+    pub(super) fn parameters(&self) -> SVector<f64, BODY_PARAMETER_COUNT> {
         let Self::Known { mass_kg, at_m: [x, y, z] } = *self else { return SVector::zeros() };
         SVector::from([1.0, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
             * mass_kg
@@ -84,7 +84,9 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
     let standing = standing.map(|square| STANDING_M_S.min(STANDING_RATIO * square.sqrt()));
     let known = load.parameters();
     let mut found = vec![];
-    for (index, (samples, legs)) in samples.chunks_exact(GROUP).zip(legs.chunks_exact(GROUP)).enumerate() {
+    for (index, (samples, legs)) in
+        samples.chunks_exact(SAMPLES_PER_EQUATION).zip(legs.chunks_exact(SAMPLES_PER_EQUATION)).enumerate()
+    {
         if !is_gapless(samples) {
             continue;
         }
@@ -93,7 +95,7 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
         else {
             continue;
         };
-        let y = regressors.iter().sum::<Regressor>() / GROUP as f64;
+        let y = regressors.iter().sum::<Regressor>() / SAMPLES_PER_EQUATION as f64;
         let time_s = samples.first().map_or(0.0, |sample| sample.time_s);
         for ((leg, row), standing) in y.row_iter().enumerate().zip(standing) {
             let of_leg = |values: &[f64; LEGS]| values.get(leg).copied().unwrap_or_default();
@@ -103,16 +105,24 @@ pub(super) fn equations(machine: &Machine, samples: &[MotionSample], load: &Load
                 continue;
             }
             let commands = || samples.iter().map(|sample| of_leg(&sample.command_n));
-            let mean = |sum: f64| sum / GROUP as f64;
-            let body = row.fixed_columns::<BODY>(0);
+            let mean = |sum: f64| sum / SAMPLES_PER_EQUATION as f64;
+            let body = row.fixed_columns::<BODY_PARAMETER_COUNT>(0);
             let mut coefficients = Unknowns::zeros();
             coefficients.fixed_rows_mut::<DYNAMIC_PARAMETER_COUNT>(0).copy_from(&-row.transpose());
             coefficients.fixed_rows_mut::<1>(SCALE + leg).fill(mean(commands().sum()));
-            coefficients.fixed_rows_mut::<1>(LOSS + leg).fill(-sign * mean(commands().map(f64::abs).sum()));
+            coefficients
+                .fixed_rows_mut::<1>(LOSS_INDEX + leg)
+                .fill(-sign * mean(commands().map(f64::abs).sum()));
             if *load == Load::Payload {
-                coefficients.fixed_rows_mut::<BODY>(PAYLOAD).copy_from(&-body.transpose());
+                coefficients.fixed_rows_mut::<BODY_PARAMETER_COUNT>(PAYLOAD).copy_from(&-body.transpose());
             }
-            found.push(Equation { leg, time_s, first: index * GROUP, coefficients, right: (body * known).x });
+            found.push(Equation {
+                leg,
+                time_s,
+                first: index * SAMPLES_PER_EQUATION,
+                coefficients,
+                right: (body * known).x,
+            });
         }
     }
     found

@@ -16,10 +16,10 @@
 use nalgebra::{DMatrix, DVector, Vector6};
 use serde::Serialize;
 
-use super::equations::{BODY, Equation, GROUP, PAYLOAD, SCALE, UNKNOWNS};
+use super::equations::{BODY_PARAMETER_COUNT, Equation, PAYLOAD, SAMPLES_PER_EQUATION, SCALE, UNKNOWNS};
 use super::fit::{DIFFERENCE_RATIO, Fit, GAUGE_DEVIATION_RATIO, autocorrelation, residual};
 use super::hypotheses::{Cause, Column, Hypotheses, delay_column, stops};
-use super::parameters::{FREE, Free, LOG_SCALE, Parameters};
+use super::parameters::{FREE_PARAMETER_COUNT, Free, LOG_SCALE_INDEX, Parameters};
 use super::{Load, Run};
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::Machine;
@@ -48,7 +48,7 @@ const WIDENING: usize = 4;
 /// How far the delay may be off before the equations show it, over its deviation: friction in proportion to the load biases it.
 const DELAY_RATIO: f64 = 5.0;
 /// The parameters and the delay.
-const ALL: usize = FREE + 1;
+const ALL: usize = FREE_PARAMETER_COUNT + 1;
 
 /// A hypothesis, and what the residuals say of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -101,7 +101,7 @@ impl Rows {
         delay_deviation_s: f64,
     ) -> Option<Self> {
         let unknowns = parameters.unknowns(&fit.free);
-        let mut slopes = DMatrix::zeros(UNKNOWNS, FREE);
+        let mut slopes = DMatrix::zeros(UNKNOWNS, FREE_PARAMETER_COUNT);
         for (index, mut column) in slopes.column_iter_mut().enumerate() {
             let size = DIFFERENCE_RATIO * parameters.deviation.row(index).x;
             let step = Free::from_fn(|row, _| if row == index { size } else { 0.0 });
@@ -113,8 +113,9 @@ impl Rows {
         let mut commands = 0.0;
         for (run, equations) in runs {
             let mut with_load = dynamic_parameters(machine);
-            let payload = unknowns.fixed_rows::<BODY>(PAYLOAD) * f64::from(run.load == Load::Payload);
-            let mut body = with_load.fixed_rows_mut::<BODY>(0);
+            let payload =
+                unknowns.fixed_rows::<BODY_PARAMETER_COUNT>(PAYLOAD) * f64::from(run.load == Load::Payload);
+            let mut body = with_load.fixed_rows_mut::<BODY_PARAMETER_COUNT>(0);
             body += run.load.parameters() + payload;
             let stops = stops(machine, &run.samples);
             let (begin_s, duration_s) = (run.samples.first()?.time_s, run.duration_s());
@@ -123,7 +124,7 @@ impl Rows {
             for equation in equations {
                 let (since_s, leg) = (equation.time_s - begin_s, equation.leg);
                 if group.as_ref().is_none_or(|(first, ..)| *first != equation.first) {
-                    let samples = run.samples.get(equation.first..equation.first + GROUP)?;
+                    let samples = run.samples.get(equation.first..equation.first + SAMPLES_PER_EQUATION)?;
                     let columns = hypotheses.columns(
                         samples,
                         &with_load,
@@ -166,7 +167,7 @@ pub(super) fn examine(
 ) -> Option<Examination> {
     let rows = Rows::new((machine, parameters, fit), runs, delay_deviation_s)?;
     let Rows { j, h, r, .. } = &rows;
-    let legs = LOG_SCALE..LOG_SCALE + LEGS;
+    let legs = LOG_SCALE_INDEX..LOG_SCALE_INDEX + LEGS;
     let gauge = DVector::from_fn(ALL, |row, _| {
         let deviation = parameters.deviation.get(row).copied().unwrap_or_default();
         if legs.contains(&row) && !is_scale_known {
@@ -179,13 +180,14 @@ pub(super) fn examine(
     let prior = (parameters.prior - fit.free).component_div(&parameters.deviation).push(0.0);
     // The fit has not moved the delay.
     let score = j.tr_mul(r) - DVector::from_iterator(ALL, prior.iter().copied());
-    let off_s = normal.solve(&score).row(FREE).x * DELAY_RATIO * delay_deviation_s;
+    let off_s = normal.solve(&score).row(FREE_PARAMETER_COUNT).x * DELAY_RATIO * delay_deviation_s;
     let widened_s = delay_deviation_s.hypot(off_s);
-    let by_delay = normal.solve(&DVector::from_fn(ALL, |row, _| if row == FREE { 1.0 } else { 0.0 }));
-    let by_delay = &by_delay / by_delay.row(FREE).x;
-    let deviations = DVector::from_iterator(FREE, parameters.deviation.iter().copied());
+    let by_delay =
+        normal.solve(&DVector::from_fn(ALL, |row, _| if row == FREE_PARAMETER_COUNT { 1.0 } else { 0.0 }));
+    let by_delay = &by_delay / by_delay.row(FREE_PARAMETER_COUNT).x;
+    let deviations = DVector::from_iterator(FREE_PARAMETER_COUNT, parameters.deviation.iter().copied());
     let mut widen = |change: &DVector<f64>| {
-        let change = change.rows(0, FREE).component_mul(&deviations);
+        let change = change.rows(0, FREE_PARAMETER_COUNT).component_mul(&deviations);
         fit.covariance += &change * change.transpose();
     };
     widen(&(by_delay * (widened_s / (DELAY_RATIO * delay_deviation_s).max(f64::MIN_POSITIVE))));

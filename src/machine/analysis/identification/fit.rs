@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Equation, SCALE, UNKNOWNS, Unknowns, triangle};
-use super::parameters::{FREE, Free, LOG_SCALE, Parameters};
+use super::parameters::{FREE_PARAMETER_COUNT, Free, LOG_SCALE_INDEX, Parameters};
 use hexad_core::model::LEGS;
 
 /// Turns of theta and sigma, steps of each, and the smallest change of the cost in deviations that counts.
@@ -30,7 +30,7 @@ pub(super) const DIFFERENCE_RATIO: f64 = 1e-4;
 pub(super) const GAUGE_DEVIATION_RATIO: f64 = 1e-5;
 /// What is squared and added up: equations of all legs, prior, gauge.
 const DATA_TERMS: usize = LEGS * (UNKNOWNS + 1);
-const TERMS: usize = DATA_TERMS + FREE + 1;
+const TERMS: usize = DATA_TERMS + FREE_PARAMETER_COUNT + 1;
 /// Most equations over which residuals count as correlated.
 const MAX_LAG: usize = 50;
 
@@ -58,7 +58,7 @@ pub(super) fn fit(
     max_force: f64,
     is_scale_known: bool,
 ) -> Option<Fit> {
-    let count = equations.len().checked_sub(FREE).filter(|rest| *rest > 0)? as f64;
+    let count = equations.len().checked_sub(FREE_PARAMETER_COUNT).filter(|rest| *rest > 0)? as f64;
     let triangles =
         core::array::from_fn(|leg| triangle(equations.iter().filter(|equation| equation.leg == leg)));
     let problem = Problem { parameters, triangles, is_scale_known };
@@ -125,14 +125,14 @@ impl Problem<'_> {
             .flat_map(|(r, scale)| (r * unknowns / (scale * sigma)).iter().copied().collect::<Vec<_>>());
         let departure = free - parameters.prior;
         let prior = departure.component_div(&parameters.deviation);
-        let scales = departure.fixed_rows::<LEGS>(LOG_SCALE).sum() / LEGS as f64;
+        let scales = departure.fixed_rows::<LEGS>(LOG_SCALE_INDEX).sum() / LEGS as f64;
         let gauge = if *is_scale_known { 0.0 } else { scales / GAUGE_DEVIATION_RATIO };
         DVector::from_iterator(TERMS, data.chain(prior.iter().copied()).chain([gauge]))
     }
 
     /// Derivatives of the terms by the parameters, each in deviations of its prior.
     fn jacobian(&self, free: &Free, sigma: f64) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(TERMS, FREE);
+        let mut jacobian = DMatrix::zeros(TERMS, FREE_PARAMETER_COUNT);
         for (index, mut column) in jacobian.column_iter_mut().enumerate() {
             let deviation = self.parameters.deviation.row(index).x;
             let step = Free::from_fn(|row, _| if row == index { DIFFERENCE_RATIO * deviation } else { 0.0 });
@@ -182,8 +182,10 @@ impl Problem<'_> {
         let information = of_data.tr_mul(&of_data).symmetric_eigenvalues();
         let shown = information.iter().filter(|value| **value > 1.0).count();
         let scaled = jacobian.tr_mul(&jacobian).cholesky()?.inverse();
-        let by =
-            DMatrix::from_diagonal(&DVector::from_iterator(FREE, self.parameters.deviation.iter().copied()));
-        Some((&by * scaled * &by, shown, FREE - shown))
+        let by = DMatrix::from_diagonal(&DVector::from_iterator(
+            FREE_PARAMETER_COUNT,
+            self.parameters.deviation.iter().copied(),
+        ));
+        Some((&by * scaled * &by, shown, FREE_PARAMETER_COUNT - shown))
     }
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6, Rotation3, Vector3, Vector6};
 
-use super::equations::BODY;
+use super::equations::BODY_PARAMETER_COUNT;
 use super::samples::MotionSample;
 use hexad_core::model::LEGS;
 use hexad_core::model::inverse_geometry::{leg_directions, leg_motion};
@@ -248,7 +248,8 @@ fn loose_columns(
     let [[x_stop, y_stop], [x_far, y_far]] = *stops;
     let [x_slope, y_slope] = slopes(machine, motion).map(|slope| 10.0 * slope);
     let places = [[x_stop, x_far, x_slope, time], [y_stop, y_far, y_slope, time]];
-    let [_, x, y, ..]: [Vector6<f64>; BODY] = core::array::from_fn(|column| y.column(column).into_owned());
+    let [_, x, y, ..]: [Vector6<f64>; BODY_PARAMETER_COUNT] =
+        core::array::from_fn(|column| y.column(column).into_owned());
     let of_axis = move |(column, places): (Vector6<f64>, [f64; 4])| {
         places.map(|place| (Cause::LoosePayload, column * (moment * place)))
     };

@@ -15,11 +15,11 @@
 
 use nalgebra::DVector;
 
-use self::equations::{Equation, GROUP, SCALE, equations};
+use self::equations::{Equation, SAMPLES_PER_EQUATION, SCALE, equations};
 use self::fit::{Fit, fit};
 use self::least_squares::least_squares;
-use self::parameters::{Bodies, FREE, Free, Parameters};
-use crate::analysis::excitation_design::base_values;
+use self::parameters::{Bodies, FREE_PARAMETER_COUNT, Free, Parameters};
+use crate::analysis::excitation_design::base_parameter_values;
 use hexad_core::model::LEGS;
 use hexad_core::model::inverse_geometry::leg_motion;
 use hexad_core::model::machine::{Machine, Platform};
@@ -117,10 +117,10 @@ pub fn identify(file: &Machine, runs: &[Run], holds_machine: bool) -> Option<Ide
 }
 
 /// How far a machine may be from its file before anything is recorded: standard deviations of its base parameters, see
-/// [`base_values`].
+/// [`base_parameter_values`].
 pub fn expected_deviations(file: &Machine) -> DynamicParameters {
     let parameters = Parameters::new(file);
-    let at = |free: &Free| base_values(&parameters.bodies(free).machine);
+    let at = |free: &Free| base_parameter_values(&parameters.bodies(free).machine);
     let mut squares = DynamicParameters::zeros();
     for (index, deviation) in parameters.deviation.iter().enumerate() {
         let step = Free::from_fn(|row, _| if row == index { DIFFERENCE * deviation } else { 0.0 });
@@ -147,14 +147,16 @@ impl Identification {
             let Bodies { machine, payload } = parameters.bodies(free);
             quantity(&machine, &payload)
         };
-        let gradient = DVector::from_fn(FREE, |index, _| {
+        let gradient = DVector::from_fn(FREE_PARAMETER_COUNT, |index, _| {
             let step = Free::from_fn(|row, _| {
                 if row == index { DIFFERENCE * parameters.deviation.row(index).x } else { 0.0 }
             });
             (at(&(free + step)) - at(&(free - step))) / (2.0 * DIFFERENCE * parameters.deviation.row(index).x)
         });
-        let scaled =
-            gradient.component_mul(&DVector::from_iterator(FREE, parameters.deviation.iter().copied()));
+        let scaled = gradient.component_mul(&DVector::from_iterator(
+            FREE_PARAMETER_COUNT,
+            parameters.deviation.iter().copied(),
+        ));
         Estimated {
             value: at(free),
             deviation: gradient.dot(&(covariance * &gradient)).max(0.0).sqrt(),
@@ -176,7 +178,7 @@ impl Run {
     /// Time of which a prediction is the mean \[s\].
     pub fn group_s(&self) -> f64 {
         let steps = self.samples.iter().zip(self.samples.iter().skip(1)).map(|(a, b)| b.time_s - a.time_s);
-        GROUP as f64 * steps.fold(f64::INFINITY, f64::min)
+        SAMPLES_PER_EQUATION as f64 * steps.fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -202,8 +204,10 @@ pub fn predictions(machine: &Machine, run: &Run) -> Vec<Prediction> {
     let prediction = |equation: Equation| {
         let command_n = equation.coefficients.row(SCALE + equation.leg).x;
         let residual_n = fit::residual(&equation, &unknowns);
-        let middle =
-            run.samples.get(equation.first + GROUP / 2).map(|sample| leg_motion(machine, &sample.motion));
+        let middle = run
+            .samples
+            .get(equation.first + SAMPLES_PER_EQUATION / 2)
+            .map(|sample| leg_motion(machine, &sample.motion));
         let of_leg = |values: [f64; LEGS]| values.get(equation.leg).copied().unwrap_or_default();
         let motion = middle.map_or([f64::NAN; 2], |legs| [of_leg(legs.length_m), of_leg(legs.rate_m_s)]);
         Prediction { leg: equation.leg, time_s: equation.time_s, motion, command_n, residual_n }
@@ -218,7 +222,7 @@ const SAME_S: f64 = 5e-3;
 
 /// Of the commands of each leg that a machine does not explain \[N\]: RMS of what is the same in each [period](PERIOD_S) of a
 /// motion, and of what differs from one to the next, which no model can explain. `None` if no run has two periods.
-pub fn errors_by_period(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LEGS]> {
+pub fn repeated_and_changing_errors(machine: &Machine, runs: &[Run]) -> Option<[[f64; 2]; LEGS]> {
     let actuator = &machine.actuator;
     let largest = [actuator.max_length_m - actuator.min_length_m, actuator.max_rate_m_s];
     let mut sums = [[0.0; 3]; LEGS];

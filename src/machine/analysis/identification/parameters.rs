@@ -26,25 +26,25 @@
 
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 
-use super::equations::{BODY, LOSS, PAYLOAD, SCALE, Unknowns};
+use super::equations::{BODY_PARAMETER_COUNT, LOSS_INDEX, PAYLOAD, SCALE, Unknowns};
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::{Link, Machine, Platform};
 use hexad_core::model::regressor::{DYNAMIC_PARAMETER_COUNT, dynamic_parameters};
 
 /// First parameter of each group.
-const CYLINDER: usize = BODY;
+const CYLINDER: usize = BODY_PARAMETER_COUNT;
 const ROD: usize = CYLINDER + 3;
 const REFLECTED: usize = ROD + 4;
 const VISCOUS: usize = REFLECTED + 1;
 const COULOMB: usize = VISCOUS + LEGS;
 const LOAD: usize = COULOMB + LEGS;
-pub(super) const LOG_SCALE: usize = LOAD + LEGS;
-const LOG_PAYLOAD: usize = LOG_SCALE + LEGS;
+pub(super) const LOG_SCALE_INDEX: usize = LOAD + LEGS;
+const LOG_PAYLOAD: usize = LOG_SCALE_INDEX + LEGS;
 /// Number of free parameters.
-pub(super) const FREE: usize = LOG_PAYLOAD + BODY;
+pub(super) const FREE_PARAMETER_COUNT: usize = LOG_PAYLOAD + BODY_PARAMETER_COUNT;
 
 /// Free parameters.
-pub(super) type Free = SVector<f64, FREE>;
+pub(super) type Free = SVector<f64, FREE_PARAMETER_COUNT>;
 
 /// Deviations of the prior: how far a machine may be from its file. Ratios, or logarithms of them.
 const MASS_RATIO: f64 = 0.3;
@@ -96,17 +96,17 @@ impl Parameters {
             }
         };
         let mut prior = Free::zeros();
-        prior.fixed_rows_mut::<BODY>(0).copy_from(&cholesky_parameters(&file.platform));
+        prior.fixed_rows_mut::<BODY_PARAMETER_COUNT>(0).copy_from(&cholesky_parameters(&file.platform));
         prior.fixed_rows_mut::<1>(REFLECTED).fill(actuator.reflected_mass_kg);
         for (first, values) in [
             (VISCOUS, actuator.viscous_friction_n_s_m),
             (COULOMB, actuator.coulomb_friction_n),
             (LOAD, actuator.load_friction_share),
-            (LOG_SCALE, actuator.force_scale.map(f64::ln)),
+            (LOG_SCALE_INDEX, actuator.force_scale.map(f64::ln)),
         ] {
             prior.fixed_rows_mut::<LEGS>(first).copy_from(&Vector6::from(values));
         }
-        prior.fixed_rows_mut::<BODY>(LOG_PAYLOAD).copy_from(&cholesky_parameters(&guess));
+        prior.fixed_rows_mut::<BODY_PARAMETER_COUNT>(LOG_PAYLOAD).copy_from(&cholesky_parameters(&guess));
 
         let mut deviation = Free::repeat(SHAPE_RATIO);
         // A flat plate may be thick: each size may be off by a share of the largest.
@@ -126,12 +126,12 @@ impl Parameters {
             (VISCOUS, LEGS, dry / actuator.max_rate_m_s),
             (COULOMB, LEGS, dry),
             (LOAD, LEGS, LOAD_FRICTION),
-            (LOG_SCALE, LEGS, FORCE_SCALE_RATIO),
+            (LOG_SCALE_INDEX, LEGS, FORCE_SCALE_RATIO),
         ] {
             deviation.rows_mut(first, count).fill(value);
         }
         // What a file states itself may be off by half.
-        for leg in VISCOUS..LOG_SCALE {
+        for leg in VISCOUS..LOG_SCALE_INDEX {
             let (stated, mut row) = (prior.row(leg).x, deviation.row_mut(leg));
             row.add_scalar_mut(0.5 * stated);
         }
@@ -145,14 +145,14 @@ impl Parameters {
 
     /// The nearest parameters with no negative friction.
     pub fn within_bounds(&self, mut free: Free) -> Free {
-        free.rows_mut(REFLECTED, LOG_SCALE - REFLECTED).apply(|value| *value = value.max(0.0));
+        free.rows_mut(REFLECTED, LOG_SCALE_INDEX - REFLECTED).apply(|value| *value = value.max(0.0));
         free
     }
 
     /// Machine and payload of these parameters.
     pub fn bodies(&self, free: &Free) -> Bodies {
         let mut machine = self.file.clone();
-        let body = |first: usize| body(free.fixed_rows::<BODY>(first).into_owned());
+        let body = |first: usize| body(free.fixed_rows::<BODY_PARAMETER_COUNT>(first).into_owned());
         machine.platform = body(0);
         let actuator = &self.file.actuator;
         let [min, max] = [actuator.min_length_m, actuator.max_length_m];
@@ -165,7 +165,7 @@ impl Parameters {
         actuator.reflected_mass_kg = free.row(REFLECTED).x;
         (actuator.viscous_friction_n_s_m, actuator.coulomb_friction_n) = (legs(VISCOUS), legs(COULOMB));
         actuator.load_friction_share = legs(LOAD);
-        actuator.force_scale = legs(LOG_SCALE).map(f64::exp);
+        actuator.force_scale = legs(LOG_SCALE_INDEX).map(f64::exp);
         Bodies { machine, payload: body(LOG_PAYLOAD) }
     }
 
@@ -178,9 +178,11 @@ impl Parameters {
         let mut unknowns = Unknowns::zeros();
         unknowns.fixed_rows_mut::<DYNAMIC_PARAMETER_COUNT>(0).copy_from(&dynamic_parameters(&machine));
         unknowns.fixed_rows_mut::<LEGS>(SCALE).copy_from(&Vector6::from(actuator.force_scale));
-        unknowns.fixed_rows_mut::<LEGS>(LOSS).copy_from(&Vector6::from_iterator(loss));
+        unknowns.fixed_rows_mut::<LEGS>(LOSS_INDEX).copy_from(&Vector6::from_iterator(loss));
         let payload = dynamic_parameters(&Machine { platform: payload, ..machine });
-        unknowns.fixed_rows_mut::<BODY>(PAYLOAD).copy_from(&payload.fixed_rows::<BODY>(0));
+        unknowns
+            .fixed_rows_mut::<BODY_PARAMETER_COUNT>(PAYLOAD)
+            .copy_from(&payload.fixed_rows::<BODY_PARAMETER_COUNT>(0));
         unknowns
     }
 }
@@ -208,8 +210,8 @@ fn scaled(link: &Link, mass: f64, logs: &Vector3<f64>, ends: [f64; 2]) -> Link {
 }
 
 /// Body of Cholesky parameters.
-fn body(parameters: SVector<f64, BODY>) -> Platform {
-    let [a, d1, d2, d3, s12, s23, s13, t1, t2, t3]: [f64; BODY] = parameters.into();
+fn body(parameters: SVector<f64, BODY_PARAMETER_COUNT>) -> Platform {
+    let [a, d1, d2, d3, s12, s23, s13, t1, t2, t3]: [f64; BODY_PARAMETER_COUNT] = parameters.into();
     let triangle = Matrix3::new(d1, s12, s13, 0.0, d2, s23, 0.0, 0.0, d3);
     let mass_kg = (2.0 * a).exp();
     // About the centre of mass the columns of t drop out.
@@ -219,7 +221,7 @@ fn body(parameters: SVector<f64, BODY>) -> Platform {
 }
 
 /// Cholesky parameters of a body.
-pub(super) fn cholesky_parameters(body: &Platform) -> SVector<f64, BODY> {
+pub(super) fn cholesky_parameters(body: &Platform) -> SVector<f64, BODY_PARAMETER_COUNT> {
     let moments = (Matrix3::identity() * (0.5 * body.inertia.trace()) - body.inertia) / body.mass_kg;
     let moments = moments + Matrix3::identity() * (LEAST_MOMENT * moments.trace());
     // An upper triangle: the lower one of the reversed axes.

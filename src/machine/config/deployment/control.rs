@@ -115,8 +115,8 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     let modes = ControlMode::ALL.map(|mode| (mode.name(), mode));
     let mode = section.choice_or("mode", ControlMode::default(), &modes);
     let leg_masses = LegMasses::at_home(machine);
-    let LegMasses { softest_mode_gain, stiffest_mode_gain, .. } = leg_masses;
-    let gains_on_legs = [softest_mode_gain, stiffest_mode_gain];
+    let LegMasses { softest_mode_gain_ratio, stiffest_mode_gain_ratio, .. } = leg_masses;
+    let gains_on_legs = [softest_mode_gain_ratio, stiffest_mode_gain_ratio];
     let [softest, stiffest] = if mode.acts_on_legs() { gains_on_legs } else { [1.0; 2] };
     let compensate_disturbances = section.flag_or("compensate_disturbances", mode.includes_inertia());
     let of = |damping_ratio: f64| plant.sampled_loop(damping_ratio, compensate_disturbances);
@@ -139,7 +139,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     let by_friction =
         velocity_errors_by_friction(machine, &leg_masses, [orientation_bandwidth_hz, position_bandwidth_hz]);
     let (on_setpoint_lost, lost_hold_s) = setpoint_loss(&mut section);
-    let mut up_to = |key, default, most| section.number_or(key, default, Bound::UpTo(most));
+    let mut up_to = |key, default, most| section.number_or(key, default, Bound::PositiveUpTo(most));
     Control {
         mode,
         position_bandwidth_hz,
@@ -161,7 +161,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
             Bound::Positive,
         ),
         fidelity: fidelity(&mut section),
-        fidelity_tolerance_share: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
+        fidelity_tolerance_share: section.number_or("fidelity_tolerance", 0.001, Bound::PositiveUpTo(1.0)),
         compensate_disturbances,
         disturbance_m_s2_per_sqrt_s,
         estimator_bandwidth_hz: plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops),

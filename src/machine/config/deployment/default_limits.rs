@@ -36,14 +36,14 @@ impl DefaultLimits {
         let tolerated = Self { position: TOLERATED_POSITION, orientation: TOLERATED_ORIENTATION };
         let Some(drives) = DriveCapability::new(machine, &machine.home_pose()) else { return tolerated };
         let actuator = &machine.actuator;
-        let (_, holding) = drives.hardest_held();
-        let available = actuator.available_force();
+        let (_, holding) = drives.largest_holding_force();
+        let available = actuator.weakest_available_force_n();
         let usable =
             USABLE_FORCE_RATIO * available - actuator.largest_viscous_friction() * actuator.max_rate_m_s;
         // Some acceleration remains even if holding and friction use nearly all force.
         let usable = usable.max(holding + LINEAR_SHARE * (available - holding));
         let for_linear = holding + LINEAR_SHARE * (usable - holding);
-        let linear = lesser(TOLERATED_POSITION.acceleration, drives.linear_acceleration(for_linear, 0.0));
+        let linear = lesser(TOLERATED_POSITION.acceleration, drives.max_linear_acceleration(for_linear, 0.0));
         let angular = lesser(TOLERATED_ORIENTATION.acceleration, drives.angular_acceleration(usable, linear));
         Self {
             position: scaled(TOLERATED_POSITION, drives.velocity(), linear),

@@ -54,15 +54,15 @@ pub(super) fn read_noise(mut section: SectionReader) -> SensorNoise {
         length_step_m: step,
         length_m: section.number_or("length_noise_m", default, Bound::Positive),
         pose_tolerance_m: section.number_or("pose_tolerance_m", DEFAULT_POSE_TOLERANCE_M, Bound::Positive),
-        rate_m_s: section.bounded_number("rate_noise_m_s", Bound::Positive),
+        rate_m_s: section.optional_number("rate_noise_m_s", Bound::Positive),
     }
 }
 
 pub(super) fn read_drive(mut section: SectionReader) -> Drive {
     let bound = Bound::Within(0.0, MAX_DELAY_US);
-    let delay_us = section.bounded_number("delay_us", bound);
+    let delay_us = section.optional_number("delay_us", bound);
     let lag_us = section.number_or("lag_us", 0.0, bound);
-    let longest = Bound::UpTo(MAX_READY_TIMEOUT_MS);
+    let longest = Bound::PositiveUpTo(MAX_READY_TIMEOUT_MS);
     let ready_timeout_s = section.number_or("ready_timeout_ms", DEFAULT_READY_TIMEOUT_MS, longest) / 1e3;
     Drive { delay_s: delay_us.map(|delay_us| delay_us / 1e6), lag_s: lag_us / 1e6, ready_timeout_s }
 }

@@ -80,7 +80,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     let position = of(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], default.position);
     let orientation = of(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], default.orientation);
     let scale = section.number_or("scale", 1.0, SCALE_BOUND);
-    let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
+    let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::PositiveUpTo(1.0));
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force_n / FORCE_RISE_S, Bound::Positive);
     let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
@@ -159,7 +159,7 @@ fn condition(
     let usual = DEFAULT_CONDITION.max(2.0 * at_home);
     let given = section.has("condition").then(|| section.number_or("condition", usual, Bound::Positive));
     let mut survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
-    let delay_s = (realtime.longest_delay_of_any_release() + MIDDLE_OF_HOLD) * realtime.period_s();
+    let delay_s = (realtime.longest_delay_periods_of_any_release() + MIDDLE_OF_HOLD) * realtime.period_s();
     let is_fast = |pose: &&SurveyedPose| pose.pole_per_s * delay_s > MAX_GROWTH_EXPONENT;
     let first_fast = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
     let slow = survey.iter().map(|pose| pose.condition).filter(|condition| *condition < first_fast);
@@ -186,7 +186,8 @@ fn check_turning(
     feedback_scale: f64,
 ) {
     let held_forces = HeldForces::new(machine);
-    let jerks = survey.iter().filter_map(|pose| held_forces.jerk_bounds(&pose.pose, limits));
+    let jerks =
+        survey.iter().filter_map(|pose| held_forces.angular_and_linear_jerk_bounds(&pose.pose, limits));
     let [angular, linear] = jerks.fold([0.0_f64; 2], |[a, b], [c, d]| [a.max(c), b.max(d)]);
     for (key, jerk, unit, limits) in [
         ("acceleration_rad_s2", angular, "rad/s^2", &limits.orientation),

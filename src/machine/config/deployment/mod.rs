@@ -151,7 +151,7 @@ fn in_position(mut section: SectionReader, noise: &SensorNoise, machine: &Machin
     let [angular, linear] = [0, 3].map(|first| by_lengths.fixed_columns::<3>(first).norm());
     let default =
         |error: f64| rounded_down(IN_POSITION_PER_NOISE * noise.length_m * error).min(MAX_IN_POSITION);
-    let bound = Bound::UpTo(MAX_IN_POSITION);
+    let bound = Bound::PositiveUpTo(MAX_IN_POSITION);
     let tolerance_m = section.number_or("tolerance_m", default(linear), bound);
     let tolerance_rad = section.number_or("tolerance_rad", default(angular), bound);
     let longest = Bound::Within(0.0, MAX_SETTLING_MS);
@@ -210,7 +210,7 @@ fn default_timeout_ms(timeout_ms: f64, rate_hz: f64) -> f64 {
 /// Reads a timeout \[s\]. It must be longer than a period, because messages are sent once per period.
 fn timeout_s(section: &mut SectionReader, key: &'static str, default_ms: f64, rate_hz: f64) -> f64 {
     let period_ms = 1e3 / rate_hz;
-    let timeout_ms = section.number_or(key, default_ms, Bound::UpTo(MAX_TIMEOUT_MS));
+    let timeout_ms = section.number_or(key, default_ms, Bound::PositiveUpTo(MAX_TIMEOUT_MS));
     if timeout_ms <= period_ms {
         let bound = format!(
             "must be greater than {} (one period of realtime.rate_hz = {rate_hz})",

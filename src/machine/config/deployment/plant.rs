@@ -46,7 +46,7 @@ impl Plant {
 }
 
 pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) -> Plant {
-    let brake = Bound::UpTo(MAX_BRAKE_DECELERATION_M_S2);
+    let brake = Bound::PositiveUpTo(MAX_BRAKE_DECELERATION_M_S2);
     let step = Bound::Within(MIN_STEP_US, MAX_STEP_US);
     let plant = Plant {
         force_timeout_s: timeout_s(
@@ -57,7 +57,8 @@ pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) 
         ),
         brake_deceleration_m_s2: section.number_or("brake_deceleration_m_s2", 9.81, brake),
         step_s: section.number_or("step_us", 250.0, step) / 1e6,
-        tolerance_m: section.number_or("tolerance_um", DEFAULT_TOLERANCE_UM, Bound::UpTo(1000.0)) / 1e6,
+        tolerance_m: section.number_or("tolerance_um", DEFAULT_TOLERANCE_UM, Bound::PositiveUpTo(1000.0))
+            / 1e6,
         imperfections: Imperfections {
             seed: u64::try_from(section.integer_or("seed", 1, 0, i32::MAX)).unwrap_or_default(),
             drive: drive(section.section("drive")),
@@ -83,7 +84,7 @@ pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) 
 fn drive(mut section: SectionReader) -> DriveErrors {
     let dead_time_us = section.number_or("dead_time_us", 0.0, Bound::Within(0.0, MAX_DEAD_TIME_US));
     DriveErrors {
-        bandwidth_hz: section.bounded_number("bandwidth_hz", Bound::Positive),
+        bandwidth_hz: section.optional_number("bandwidth_hz", Bound::Positive),
         force_step_n: section.number_or("force_step_n", 0.0, Bound::NotNegative),
         dead_time_ns: (1e3 * dead_time_us).round() as u64,
     }
@@ -103,7 +104,7 @@ fn friction(mut section: SectionReader) -> Friction {
 }
 
 fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
-    let stiffness = section.bounded_number("stiffness_n_m", Bound::Positive);
+    let stiffness = section.optional_number("stiffness_n_m", Bound::Positive);
     let damping_n_s_m = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
     let backlash_m = section.number_or("backlash_m", 0.0, Bound::NotNegative);
     if stiffness.is_some() && machine.actuator.reflected_mass_kg == 0.0 {

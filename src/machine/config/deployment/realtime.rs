@@ -115,7 +115,7 @@ impl Realtime {
     /// the release, and the force may begin at the next release. Delays of the drives are added to it.
     pub fn longest_delay(&self) -> f64 {
         match self.release {
-            ReleaseMode::Sleep | ReleaseMode::Hybrid => self.longest_delay_of_any_release(),
+            ReleaseMode::Sleep | ReleaseMode::Hybrid => self.longest_delay_periods_of_any_release(),
             // Released by the measurement itself.
             ReleaseMode::External | ReleaseMode::Lockstep => 1.0,
         }
@@ -123,7 +123,7 @@ impl Realtime {
 
     /// The same for whatever releases the loop. The default limits of a machine follow from it: a simulation of the machine has
     /// the same.
-    pub fn longest_delay_of_any_release(&self) -> f64 {
+    pub fn longest_delay_periods_of_any_release(&self) -> f64 {
         2.0 + self.io_lead_s * self.rate_hz
     }
 

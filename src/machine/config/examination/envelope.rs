@@ -19,7 +19,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
     let config = examiner.config;
     let Some(bounds) = &config.deployment.envelope else { return };
     let limits = &config.deployment.limits;
-    let reachable = config.machine.within_margin(limits.stroke_margin_m);
+    let reachable = config.machine.with_stroke_margin(limits.stroke_margin_m);
     match prove(&reachable, &Clearance::new(&reachable, limits.condition), bounds) {
         RegionProof::Clear => examine_forces(examiner, bounds),
         RegionProof::Violated(offsets, WorkspaceLimit::HoldingForce(_)) => {
@@ -27,7 +27,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
                 (nalgebra::Vector6::from(config.machine.home) + nalgebra::Vector6::from(offsets)).into();
             let pose = TaskState::at_rest(x).motion().pose;
             let drives = DriveCapability::new(&config.machine, &pose);
-            let Some((leg, force)) = drives.map(|drives| drives.hardest_held()) else { return };
+            let Some((leg, force)) = drives.map(|drives| drives.largest_holding_force()) else { return };
             let place = format!("within [envelope] {}", offset_text(&offsets));
             examine_holding(examiner, leg, force, &place);
         }
@@ -57,7 +57,7 @@ fn examine_forces(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     let held = forces.map(hardest).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
     let Some((state, (leg, force))) = held else { return };
     let force = force + machine.actuator.largest_coulomb_friction();
-    if force > MAX_HOLDING_SHARE * machine.actuator.available_force() {
+    if force > MAX_HOLDING_SHARE * machine.actuator.weakest_available_force_n() {
         let mut offsets: [f64; 6] = state.x.into();
         offsets.iter_mut().zip(machine.home).for_each(|(x, home)| *x -= home);
         examine_holding(examiner, leg, force, &format!("within [envelope] {}", offset_text(&offsets)));
@@ -77,7 +77,13 @@ fn examine_motion(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     }
     let actuator = &machine.actuator;
     for (key, largest, limit, unit, limited) in [
-        ("envelope.acceleration", largest_force, actuator.available_force(), "N", "actuator.max_force_n"),
+        (
+            "envelope.acceleration",
+            largest_force,
+            actuator.weakest_available_force_n(),
+            "N",
+            "actuator.max_force_n",
+        ),
         ("envelope.velocity", largest_rate, actuator.max_rate_m_s, "m/s", "actuator.max_rate_m_s"),
     ] {
         if largest > limit {

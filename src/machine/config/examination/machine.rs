@@ -17,9 +17,9 @@ pub(super) fn examine(examiner: &mut Examiner) {
     let machine = &examiner.config.machine;
     let pose = machine.home_pose();
     let Some(drives) = DriveCapability::new(machine, &pose) else { return };
-    let (leg, force) = drives.hardest_held();
+    let (leg, force) = drives.largest_holding_force();
     examine_holding(examiner, leg, force, "at home");
-    if force <= MAX_HOLDING_SHARE * machine.actuator.available_force() {
+    if force <= MAX_HOLDING_SHARE * machine.actuator.weakest_available_force_n() {
         examine_limits(examiner, &drives);
     }
     for crossing in leg_crossings(machine, &pose) {
@@ -31,7 +31,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
 /// Rejects drives that cannot hold the platform with a margin. The leg counts from 0.
 pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, place: &str) {
     let actuator = &examiner.config.machine.actuator;
-    let (limit, available) = (actuator.max_force_n, actuator.available_force());
+    let (limit, available) = (actuator.max_force_n, actuator.weakest_available_force_n());
     if force > MAX_HOLDING_SHARE * available {
         let bound = format!(
             "must be at least {} to hold the platform: leg {} needs {} N {place}, {:.0} % of the limit, and at most {:.0} % may be needed",
@@ -49,10 +49,11 @@ pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, p
 /// velocities beyond the rate of the legs, which the reference keeps in any case.
 fn examine_limits(examiner: &mut Examiner, drives: &DriveCapability) {
     let config = examiner.config;
-    let (limits, force) = (&config.deployment.limits.reference, config.machine.actuator.available_force());
+    let (limits, force) =
+        (&config.deployment.limits.reference, config.machine.actuator.weakest_available_force_n());
     let (linear, angular) = (limits.position.acceleration, limits.orientation.acceleration);
     let alone = [
-        ("limits.acceleration_m_s2", linear, drives.linear_acceleration(force, 0.0)),
+        ("limits.acceleration_m_s2", linear, drives.max_linear_acceleration(force, 0.0)),
         ("limits.acceleration_rad_s2", angular, drives.angular_acceleration(force, 0.0)),
     ];
     let mut is_possible = true;

@@ -103,7 +103,7 @@ fn drive_ratios(examiner: &Examiner) -> Vec<Ratio> {
     let actuator = &machine.actuator;
     let largest = |of_legs: &[f64; LEGS]| of_legs.iter().copied().fold(0.0, f64::max);
     let drives = DriveCapability::new(machine, &machine.home_pose());
-    let held = drives.map_or(0.0, |drives| drives.hardest_held().1);
+    let held = drives.map_or(0.0, |drives| drives.largest_holding_force().1);
     let (force, stroke) = (actuator.max_force_n, actuator.max_length_m - actuator.min_length_m);
     const FORCE: &str = "actuator.max_force_n";
     vec![

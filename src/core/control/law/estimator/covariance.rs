@@ -125,7 +125,7 @@ impl Covariance {
     }
 
     /// Variance of the innovation of e, relative to the variance of a reading.
-    pub fn innovation_variance(&self) -> f64 {
+    pub fn innovation_variance_ratio(&self) -> f64 {
         self.ee + 1.0
     }
 }
@@ -166,7 +166,7 @@ mod tests {
             let mut before = covariance;
             before.advance(&model(hertz, None), 1.0);
             if hertz == 30.0 {
-                assert!((before.innovation_variance().sqrt() - 1.21).abs() < 0.005);
+                assert!((before.innovation_variance_ratio().sqrt() - 1.21).abs() < 0.005);
             }
         }
     }

@@ -119,7 +119,7 @@ pub struct ReadingErrors {
     /// Standard deviation of the noise \[m\].
     pub deviation_m: f64,
     /// Resolution \[m\]; 0 if unknown.
-    pub resolution_m: f64,
+    pub resolution_or_0_m: f64,
 }
 
 /// Largest innovation by noise, in standard deviations; noise exceeds it once in years.
@@ -146,7 +146,7 @@ impl EstimatorConstants {
 
     /// Largest plausible innovation of a leg, `dt_s` after the last measurement \[m\]: noise, plus the
     /// displacement by a disturbance that the estimate does not yet contain, `a (1 / we^2 + dt^2 / 2)`.
-    pub fn innovation_bound(&self, dt_s: f64) -> f64 {
+    pub fn innovation_bound_m(&self, dt_s: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth_rad_s;
         MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation_m)
             + self.max_plausible_acceleration_m_s2 * (lag * lag + 0.5 * dt_s * dt_s)
@@ -193,7 +193,7 @@ impl Estimator {
     }
 
     /// Estimate at the instant of the last measurement, or of the start.
-    pub fn at_measurement(&self) -> &ErrorEstimate {
+    pub fn estimate_at_last_measurement(&self) -> &ErrorEstimate {
         &self.filter.state
     }
 

@@ -12,7 +12,7 @@ const ZERO: Matrix6<f64> = Matrix6::from_array_storage(nalgebra::ArrayStorage([[
 const NO_FRICTION: FrictionEffects = FrictionEffects {
     force_n: 0.0,
     payload_kg_per_n: [0.0; 6],
-    acceleration_m_s2_per_n: [0.0; 6],
+    swing_acceleration_m_s2_per_n: [0.0; 6],
     by_force: ZERO,
     force_by_disturbance: ZERO,
 };

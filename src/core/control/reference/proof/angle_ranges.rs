@@ -110,7 +110,7 @@ impl AngleRanges {
     /// most [`MARGIN_CAP_RATIO`] of the width.
     #[inline(always)]
     pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, margin_rad: f64) -> bool {
-        let c = cosine_of_beta(r);
+        let c = abs_cosine_of_beta(r);
         let both = |lanes: [f64; LANES / 2]| {
             let lanes = f64x4::load_array(simd, lanes);
             lanes.combine(lanes)
@@ -131,7 +131,7 @@ impl AngleRanges {
 
 /// `|cos(beta)|`
 #[inline(always)]
-pub(in crate::control::reference) fn cosine_of_beta(r: &Matrix3<f64>) -> f64 {
+pub(in crate::control::reference) fn abs_cosine_of_beta(r: &Matrix3<f64>) -> f64 {
     (r.m11 * r.m11 + r.m12 * r.m12).sqrt()
 }
 

@@ -8,7 +8,7 @@ use crate::control::constants::Constants;
 use crate::control::reference::proof::drive_forces::CenterDistance;
 use crate::control::reference::proof::regularity::{CenterConditioning, Reach, Regularity};
 use crate::model::rigid::Pose;
-use crate::model::sensitivity::MAX_WRENCH_NORM;
+use crate::model::sensitivity::MAX_LEG_WRENCHES_NORM;
 
 /// Balls in a group, one in each lane.
 pub(super) const LANES: usize = 4;
@@ -85,7 +85,7 @@ impl BallGroup {
         let turned_leg = turned_squared.sqrt();
         let turned_arm = turn + turned_leg;
         let change = (splat(6.0) * (turned_squared + turned_arm * turned_arm)).sqrt();
-        let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM));
+        let largest_norm = (norm + change).min(splat(MAX_LEG_WRENCHES_NORM));
         let Regularity { condition, universal_sine: least_sine } = *required;
         let is_covered = left.simd_gt(splat(0.0))
             & distances.chord.simd_le(splat(MAX_CHORD))

@@ -36,17 +36,17 @@ const MAX_EVALUATIONS: u32 = 4;
 
 /// Bounds of the forces \[N\].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(in crate::control::reference) struct ForceBounds {
+pub(in crate::control::reference) struct DriveForceBounds {
     /// At rest.
     pub holding_n: f64,
     /// In motion.
     pub moving_n: f64,
 }
 
-impl ForceBounds {
+impl DriveForceBounds {
     /// Bounds for a platform within them.
     pub fn new(machine: &Machine) -> Self {
-        let force = machine.actuator.available_force();
+        let force = machine.actuator.weakest_available_force_n();
         Self { holding_n: MAX_HOLDING_SHARE * force, moving_n: MAX_MOVING_SHARE * force }
     }
 
@@ -55,7 +55,8 @@ impl ForceBounds {
     pub fn relax_to(&mut self, constants: &Constants, loads: &DriveLoads) -> bool {
         let LegLanes(forces) = loads.holding;
         let actuator = &constants.machine().actuator;
-        let (available, friction) = (actuator.available_force(), actuator.largest_coulomb_friction());
+        let (available, friction) =
+            (actuator.weakest_available_force_n(), actuator.largest_coulomb_friction());
         let holding_n = largest(forces) + friction;
         let is_beyond = holding_n > self.holding_n;
         if is_beyond {
@@ -183,7 +184,7 @@ fn norm(forces: [f64; 8]) -> f64 {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct ForceProof {
     demand: StopDemand,
-    bounds: ForceBounds,
+    bounds: DriveForceBounds,
     /// Force at rest by which the bound may be exceeded between knots \[N\].
     held_between_knots: f64,
     /// Bound on the forces at any pose.
@@ -195,7 +196,7 @@ pub(in crate::control::reference) struct ForceProof {
 
 impl ForceProof {
     /// Proof for a stop in free space, or knot by knot.
-    pub fn new(constants: &Constants, demand: StopDemand, bounds: ForceBounds, kind: StopKind) -> Self {
+    pub fn new(constants: &Constants, demand: StopDemand, bounds: DriveForceBounds, kind: StopKind) -> Self {
         let held_between_knots = match kind {
             StopKind::ReleaseFirst => 0.0,
             StopKind::BrakeAtOnce => FORCE_BETWEEN_KNOTS_RATIO * bounds.moving_n,

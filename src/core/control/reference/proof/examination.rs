@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
-use crate::control::reference::proof::angle_ranges::{AngleRanges, cosine_of_beta};
+use crate::control::reference::proof::angle_ranges::{AngleRanges, abs_cosine_of_beta};
 use crate::control::reference::proof::cubic_departure::{
     CUBIC_DEPARTURE_RATIO, CUBIC_RATE_DEPARTURE_RATIO, length_acceleration_bound, length_jerk_bound,
 };
@@ -33,7 +33,7 @@ use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{REGULARITY_EFFORT, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
 use crate::control::reference::proof::tolerances::{
-    ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_RATIO, VELOCITY_ROUNDING_RATIO,
+    ANGLE_ROUNDING_RAD, BETWEEN_KNOTS_PER_STROKE, VELOCITY_ROUNDING_RATIO,
 };
 use crate::control::reference::stop::pose_stop::{
     PoseStop, PoseStopState, advanced_without_orthonormalizing,
@@ -81,7 +81,7 @@ pub(in crate::control::reference) struct StopExamination<'a> {
     /// start slightly beyond a bound, the stop may be equally far beyond. Otherwise the reference could not
     /// return.
     from: Option<&'a Pose>,
-    length_excess: f64,
+    length_excess_m: f64,
     /// Regularity of `from`, and the envelope extended to contain it; computed when they are first needed.
     start_regularity: Option<Regularity>,
     relaxed: Option<(Envelope, AngleRanges)>,
@@ -151,7 +151,7 @@ impl<'a> StopExamination<'a> {
                 .zip(x)
                 .and_then(|(envelope, x)| AngleRanges::if_stop_may_leave(envelope, x, &stop.orientation)),
             from: step.from,
-            length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
+            length_excess_m: step.from.map_or(0.0, |from| bounds.length_excess_m(constants, from)),
             start_regularity: None,
             relaxed: None,
             effort: MAX_STEP_EFFORT.saturating_sub(step.effort).saturating_sub(knots.intervals),
@@ -222,8 +222,9 @@ impl<'a> StopExamination<'a> {
         let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
         let [in_step, ..] = self.step_departure;
         let departure = (self.length_jerk_bound * CUBIC_DEPARTURE_RATIO * dt * dt * dt).max(in_step);
-        let margin = (departure - BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
-        if !room.simd_ge(splat(margin - self.length_excess)).all_true() {
+        let margin =
+            (departure - BETWEEN_KNOTS_PER_STROKE * self.constants.machine().actuator.stroke()).max(0.0);
+        if !room.simd_ge(splat(margin - self.length_excess_m)).all_true() {
             return Err(Limit::Stroke.into());
         }
         if !self.is_in_envelope(simd, pose, state, adjacent) && !self.is_no_farther_beyond_envelope(pose) {
@@ -318,12 +319,13 @@ impl<'a> StopExamination<'a> {
             return 0.0;
         }
         let dt = dt.max(self.step_s);
-        let (s, c) = (pose.rotation.m13.abs(), cosine_of_beta(&pose.rotation));
+        let (s, c) = (pose.rotation.m13.abs(), abs_cosine_of_beta(&pose.rotation));
         let alpha = self.constants.parameters.limits.orientation.acceleration;
         let w = state.orientation.velocity.norm() + alpha * dt;
         let w = self.stop.orientation.peak_velocity.min(w);
         let curvature = alpha / c + w * w * (1.0 + c + 3.0 * s) / (c * c);
-        let room = BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm_m;
+        let room =
+            BETWEEN_KNOTS_PER_STROKE * self.constants.machine().actuator.stroke() / self.constants.arm_m;
         (curvature * dt * dt / 8.0 - room).max(0.0)
     }
 

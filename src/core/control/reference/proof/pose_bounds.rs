@@ -4,8 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
-use crate::control::reference::proof::drive_forces::ForceBounds;
-use crate::control::reference::proof::tolerances::{END_STOP_RATIO, RANGE_ROUNDING, START_RATIO};
+use crate::control::reference::proof::drive_forces::DriveForceBounds;
+use crate::control::reference::proof::tolerances::{
+    END_STOP_DISTANCE_PER_STROKE, RANGE_ROUNDING, START_EXCESS_PER_STROKE,
+};
 use crate::model::LEGS;
 use crate::model::drive_loads::DriveLoads;
 use crate::model::inverse_geometry::leg_lengths;
@@ -21,7 +23,7 @@ pub(in crate::control::reference) struct PoseBounds {
     /// Largest leg lengths \[m\].
     pub longest_m: [f64; LEGS],
     pub envelope: Option<Envelope>,
-    pub forces: ForceBounds,
+    pub forces: DriveForceBounds,
     is_relaxed: bool,
 }
 
@@ -36,7 +38,7 @@ impl PoseBounds {
                 lowest: lowest.map(|x| x - RANGE_ROUNDING),
                 highest: highest.map(|x| x + RANGE_ROUNDING),
             }),
-            forces: ForceBounds::new(constants.machine()),
+            forces: DriveForceBounds::new(constants.machine()),
             is_relaxed: false,
         }
     }
@@ -45,7 +47,8 @@ impl PoseBounds {
     pub fn relaxed_to(constants: &Constants, pose: &Pose) -> Self {
         let mut bounds = Self::configured(constants);
         let actuator = &constants.machine().actuator;
-        let [stroke_room, end_room] = [START_RATIO, END_STOP_RATIO].map(|ratio| ratio * actuator.stroke());
+        let [stroke_room, end_room] =
+            [START_EXCESS_PER_STROKE, END_STOP_DISTANCE_PER_STROKE].map(|ratio| ratio * actuator.stroke());
         let lengths = leg_lengths(constants.machine(), pose);
         let (low_end, high_end) = (actuator.min_length_m + end_room, actuator.max_length_m - end_room);
         for (bound, length) in bounds.shortest_m.iter_mut().zip(lengths) {
@@ -70,7 +73,7 @@ impl PoseBounds {
     }
 
     /// Distance by which the worst leg exceeds its bound at a pose; 0 if none does \[m\].
-    pub fn length_excess(&self, constants: &Constants, pose: &Pose) -> f64 {
+    pub fn length_excess_m(&self, constants: &Constants, pose: &Pose) -> f64 {
         let lengths = leg_lengths(constants.machine(), pose);
         let ends = self.shortest_m.iter().zip(&self.longest_m);
         let excesses =

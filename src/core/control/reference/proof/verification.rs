@@ -44,7 +44,7 @@ impl Verifier {
     ) -> Result<StopKind, Refusal> {
         let Limits { orientation, position, .. } = &constants.parameters.limits;
         let Motion { pose, twist, acceleration } = motion;
-        let limits = constants.parameters.limits.with_accelerations_scaled(step.strength_share);
+        let limits = constants.parameters.limits.scaled_at_equal_stopping_distance(step.strength_share);
         let turn = release_first_extent(&twist.angular, &acceleration.angular, &limits.orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, &limits.position);
         let (inner, allowed) = (&step.inner_speeds, 1.0 + VELOCITY_ROUNDING_RATIO);

@@ -38,7 +38,7 @@ use nalgebra::{Vector3, Vector6};
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::proof::tolerances::WALL_RATIO;
+use crate::control::reference::proof::tolerances::WALL_DISTANCE_PER_STROKE;
 use crate::control::reference::proposal::approach::{Approach, WantedVelocity};
 use crate::control::reference::proposal::walls::derivative_bound::DerivativeBound;
 use crate::control::reference::stop::vector_stop::straight_extent;
@@ -164,7 +164,7 @@ impl Walls {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
         let radius = machine.joints.radius_m;
         let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
-        let kept = WALL_RATIO * machine.actuator.stroke();
+        let kept = WALL_DISTANCE_PER_STROKE * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
         let LegMotion { length_m, rate_m_s, accel_m_s2 } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();

@@ -87,7 +87,7 @@ impl HeldStop {
 
     fn begin(&mut self, constants: &Constants, kind: StopKind, motion: &Motion) {
         if let StopKind::ReleaseFirst = kind {
-            let limits = constants.parameters.limits.with_accelerations_scaled(self.strength);
+            let limits = constants.parameters.limits.scaled_at_equal_stopping_distance(self.strength);
             self.spare().plan(constants.machine().level, kind, motion, &limits);
             self.is_second_held ^= true;
         }

@@ -8,7 +8,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::control::reference::stop::vector_stop::{Stop, StopState};
+use crate::control::reference::stop::vector_stop::{Stop, VectorStopState};
 use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::control::signals::pair::Pair;
 use crate::model::rigid::{Motion, Pose, Twist};
@@ -33,14 +33,14 @@ pub(in crate::control::reference) struct PoseStop {
 /// State of a stop at one instant, relative to its start.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseStopState {
-    pub orientation: StopState,
-    pub position: StopState,
+    pub orientation: VectorStopState,
+    pub position: VectorStopState,
 }
 
 impl PoseStopState {
     /// State at the start of a stop from a motion.
     pub fn begin(Motion { twist, acceleration, .. }: &Motion) -> Self {
-        let state = |velocity: &Vector3<f64>, acceleration: &Vector3<f64>| StopState {
+        let state = |velocity: &Vector3<f64>, acceleration: &Vector3<f64>| VectorStopState {
             displacement: Vector3::zeros(),
             velocity: *velocity,
             acceleration: *acceleration,
@@ -102,7 +102,7 @@ impl PoseStop {
     #[inline(always)]
     pub fn reach(&self, state: &PoseStopState, dt_s: f64, limits: &Limits) -> Pair<f64> {
         let half = 0.5 * dt_s;
-        let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
+        let way = |stop: &Stop, state: &VectorStopState, limits: &DerivativeLimits| {
             half * stop.peak_velocity.min(state.velocity.norm() + 0.5 * half * limits.acceleration)
         };
         Pair {

@@ -107,7 +107,7 @@ pub(in crate::control::reference) fn braking_direction(
 
 /// Displacement, velocity and acceleration at one instant of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(in crate::control::reference) struct StopState {
+pub(in crate::control::reference) struct VectorStopState {
     pub displacement: Vector3<f64>,
     pub velocity: Vector3<f64>,
     pub acceleration: Vector3<f64>,
@@ -123,7 +123,7 @@ struct Piece {
 }
 
 impl Piece {
-    fn new(begin: &StopState, jerk: &Vector3<f64>) -> Self {
+    fn new(begin: &VectorStopState, jerk: &Vector3<f64>) -> Self {
         Self {
             displacement: padded(&begin.displacement),
             velocity: padded(&begin.velocity),
@@ -134,7 +134,7 @@ impl Piece {
 
     /// State `dt` seconds after the start of the piece.
     #[inline(always)]
-    fn after<S: Simd>(&self, simd: S, dt: f64) -> StopState {
+    fn after<S: Simd>(&self, simd: S, dt: f64) -> VectorStopState {
         let (load, splat) = (|lanes| f64x4::load_array(simd, lanes), |number| f64x4::splat(simd, number));
         let vector = |lanes: f64x4<S>| {
             let [x, y, z, _] = lanes.to_array();
@@ -142,7 +142,7 @@ impl Piece {
         };
         let (velocity, acceleration, jerk) = (load(self.velocity), load(self.acceleration), load(self.jerk));
         let mean_velocity = velocity + (acceleration * splat(0.5) + jerk * splat(dt / 6.0)) * splat(dt);
-        StopState {
+        VectorStopState {
             displacement: vector(load(self.displacement) + mean_velocity * splat(dt)),
             velocity: vector(velocity + (acceleration + jerk * splat(0.5 * dt)) * splat(dt)),
             acceleration: vector(acceleration + jerk * splat(dt)),
@@ -231,13 +231,13 @@ impl Stop {
 
     /// State `t_s` seconds after the start; at rest from the end on.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, t_s: f64) -> StopState {
+    pub fn at<S: Simd>(&self, simd: S, t_s: f64) -> VectorStopState {
         // Compares all starts without a branch: successive calls are mostly for knots in different pieces.
         let begun = self.begins.iter().map(|begin| usize::from(*begin <= t_s)).sum::<usize>();
         let index = begun.saturating_sub(1);
         match (self.pieces.get(index), self.begins.get(index)) {
             (Some(piece), Some(begin)) => piece.after(simd, t_s - begin),
-            _ => StopState::default(),
+            _ => VectorStopState::default(),
         }
     }
 }
@@ -246,13 +246,13 @@ impl Stop {
 struct Pieces<'a, S: Simd> {
     simd: S,
     stop: &'a mut Stop,
-    end: StopState,
+    end: VectorStopState,
 }
 
 impl<'a, S: Simd> Pieces<'a, S> {
     #[inline(always)]
     fn new(simd: S, stop: &'a mut Stop, v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
-        let end = StopState { velocity: *v, acceleration: *a, ..StopState::default() };
+        let end = VectorStopState { velocity: *v, acceleration: *a, ..VectorStopState::default() };
         (stop.count, stop.begins, stop.duration_s) = (0, [f64::INFINITY; MAX_PIECES], 0.0);
         Self { simd, stop, end }
     }
@@ -291,7 +291,7 @@ impl<'a, S: Simd> Pieces<'a, S> {
     /// Appends the rest at the end of the stop, and stores the peak velocity.
     #[inline(always)]
     fn finish_with_rest(self, peak_velocity: f64) {
-        let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
+        let rest = VectorStopState { displacement: self.end.displacement, ..VectorStopState::default() };
         let Stop { pieces, count, begins, duration_s, .. } = self.stop;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
             (*piece, *begin) = (Piece::new(&rest, &Vector3::zeros()), *duration_s);

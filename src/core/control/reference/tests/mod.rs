@@ -5,7 +5,7 @@ use fearless_simd::{Level, dispatch};
 
 use crate::control::parameters::Envelope;
 use crate::control::reference::Refusal;
-use crate::control::reference::proof::drive_forces::{ForceBounds, ForceProof, StopDemand};
+use crate::control::reference::proof::drive_forces::{DriveForceBounds, ForceProof, StopDemand};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::regular_balls::RegularBalls;
 use crate::control::reference::proof::regularity::{Regularity, RegularityQuery};
@@ -36,6 +36,6 @@ fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reac
 
 /// Proof of forces that no stop exceeds.
 fn unlimited_forces(constants: &Constants) -> ForceProof {
-    let bounds = ForceBounds { holding_n: f64::INFINITY, moving_n: f64::INFINITY };
+    let bounds = DriveForceBounds { holding_n: f64::INFINITY, moving_n: f64::INFINITY };
     ForceProof::new(constants, StopDemand::default(), bounds, StopKind::ReleaseFirst)
 }

@@ -209,7 +209,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
             }
         }
     }
-    assert!(nearest > 1000 && worst > 0.95 * WALL_RATIO, "{nearest}: {worst}");
+    assert!(nearest > 1000 && worst > 0.95 * WALL_DISTANCE_PER_STROKE, "{nearest}: {worst}");
 }
 
 /// Conditions of the nearest velocity: no wall is approached too fast, and the change over its amount is a sum of the

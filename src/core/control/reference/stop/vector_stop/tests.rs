@@ -37,7 +37,7 @@ fn norm(lanes: Padded) -> f64 {
     nalgebra::Vector4::from(lanes).norm()
 }
 
-fn state(stop: &Stop, t: f64) -> StopState {
+fn state(stop: &Stop, t: f64) -> VectorStopState {
     dispatch!(Level::new(), simd => stop.at(simd, t))
 }
 
