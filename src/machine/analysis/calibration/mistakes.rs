@@ -1,0 +1,90 @@
+//! Mistakes of a table that no joints within their tolerance explain, each tried against the drawn machine.
+
+use nalgebra::Vector3;
+
+use super::model::{Geometry, Noise, Row, Seen, Unknowns};
+use super::solve::{Problem, median};
+use super::start::start;
+use hexad_core::model::LEGS;
+use hexad_core::model::machine::Machine;
+
+/// Tolerance at which the joints stay as drawn, as a share of the radius.
+const FIXED_RATIO: f64 = 1e-9;
+/// Noise with which the frames are fitted, as a share of the radius: all residuals count alike.
+const COARSE_RATIO: f64 = 1e-3;
+/// Misfit that a mistake must leave at most, as a share of the misfit without it.
+const EXPLAINED_RATIO: f64 = 0.4;
+
+/// Mistake of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mistake {
+    /// The lengths of two legs, counted from 0, are exchanged.
+    ExchangedLegs(usize, usize),
+    /// An axis of positions, counted from 0, has the wrong sign, but orientations are right.
+    MirroredAxis(usize),
+    /// The tracker's frame is left-handed.
+    LeftHanded,
+    /// Lengths of legs must be multiplied by a factor.
+    LengthUnit(f64),
+    /// Positions of the tracker must be multiplied by a factor.
+    TrackerUnit(f64),
+}
+
+/// Frames that suit the drawn machine best, and the median residual with them \[m\].
+pub fn drawn_fit(machine: &Machine, rows: &[Row]) -> Option<(Unknowns, f64)> {
+    let (nominal, radius) = (Geometry::of(machine), machine.joints.radius);
+    let noise = Noise { length_m: radius, position_m: radius, angle_rad: 1.0 }.scaled(COARSE_RATIO);
+    let problem = Problem { rows, nominal: &nominal, tolerance_m: FIXED_RATIO * radius, noise };
+    let fit = problem.minimum(start(machine, rows)?)?;
+    let square = median(fit.rows.iter().map(|(terms, _)| terms.residual.norm_squared()));
+    Some((fit.unknowns, noise.length_m * square.sqrt()))
+}
+
+/// The mistake that explains a misfit \[m\] best, if one does.
+pub fn likely_mistake(machine: &Machine, rows: &[Row], misfit_m: f64) -> Option<Mistake> {
+    let misfit = |mistake: Mistake| {
+        let corrected: Vec<_> = rows.iter().map(|row| mistake.corrected(row)).collect();
+        Some((mistake, drawn_fit(machine, &corrected)?.1))
+    };
+    let found = all().filter_map(misfit).filter(|(_, misfit)| *misfit < EXPLAINED_RATIO * misfit_m);
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(mistake, _)| mistake)
+}
+
+fn all() -> impl Iterator<Item = Mistake> {
+    let pairs = (0..LEGS).flat_map(|a| (a + 1..LEGS).map(move |b| Mistake::ExchangedLegs(a, b)));
+    let units = [1e3, 1e-3].into_iter().flat_map(|unit| [Mistake::LengthUnit(unit), Mistake::TrackerUnit(unit)]);
+    pairs.chain((0..3).map(Mistake::MirroredAxis)).chain([Mistake::LeftHanded]).chain(units)
+}
+
+impl Mistake {
+    /// A row without the mistake.
+    fn corrected(self, row: &Row) -> Row {
+        let mut row = row.clone();
+        match self {
+            Self::ExchangedLegs(a, b) => row.lengths.swap_rows(a, b),
+            Self::LengthUnit(factor) => row.lengths *= factor,
+            Self::TrackerUnit(factor) => row.seen.for_each_place(|place| *place *= factor),
+            Self::MirroredAxis(axis) => row.seen.for_each_place(|place| place[axis] = -place[axis]),
+            Self::LeftHanded => {
+                row.seen.for_each_place(|place| place.z = -place.z);
+                if let Seen::Probe(pose) = &mut row.seen {
+                    // M R M with M = diag(1, 1, -1).
+                    for k in 0..2 {
+                        pose.rotation[(k, 2)] = -pose.rotation[(k, 2)];
+                        pose.rotation[(2, k)] = -pose.rotation[(2, k)];
+                    }
+                }
+            }
+        }
+        row
+    }
+}
+
+impl Seen {
+    fn for_each_place(&mut self, change: impl FnMut(&mut Vector3<f64>)) {
+        match self {
+            Self::Probe(pose) => [&mut pose.position].into_iter().for_each(change),
+            Self::Reflectors(places) => places.iter_mut().flatten().for_each(change),
+        }
+    }
+}
