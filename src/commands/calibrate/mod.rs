@@ -125,7 +125,8 @@ impl CalibrateArguments {
         let changed = Config::parse(&new, "the new machine file")?;
         write_new(path, &new)?;
         if !self.json {
-            let (lines, margins) = (difference(&config.text, &new), changed_margins(config, &changed).join("\n"));
+            let (lines, margins) =
+                (difference(&config.text, &new), changed_margins(config, &changed).join("\n"));
             print(format_args!(
                 "\n{lines}\nhexad check, before and after:\n\n{margins}\n\n{}: written; X of home stays, its lengths are new\n",
                 path.display()
@@ -156,7 +157,8 @@ fn workspace(config: &Config, count: usize, shares: [f64; 2], seed: u64) -> Vec<
 fn new_joints(found: &Calibration) -> Vec<NewValue> {
     let deviations = &found.deviations_m;
     let joint = |key: &str, leg: usize, first: usize, place: nalgebra::Vector3<f64>| {
-        let estimate = |axis: usize| Estimate { value: place[axis], deviation: deviations[first + 3 * leg + axis] };
+        let estimate =
+            |axis: usize| Estimate { value: place[axis], deviation: deviations[first + 3 * leg + axis] };
         let value = NewNumbers::Array((0..3).map(estimate).collect());
         NewValue { key: format!("leg[{}].{key}", leg + 1), value }
     };

@@ -47,7 +47,12 @@ struct Map {
 }
 
 /// Text of a page.
-pub(super) fn text(config: &Config, report: &CalibrationReport, found: &Calibration, workspace: &[Pose]) -> String {
+pub(super) fn text(
+    config: &Config,
+    report: &CalibrationReport,
+    found: &Calibration,
+    workspace: &[Pose],
+) -> String {
     let legs = &report.legs;
     let facts = report.facts();
     let title = format!("{}: calibration", report.machine);
@@ -74,7 +79,10 @@ fn map(config: &Config, found: &Calibration, workspace: &[Pose], plane: [usize; 
     let home = config.machine.home;
     let ranges = plane.map(|axis| {
         let at = |pose: &Pose| task_coordinates(pose, &home).get(axis).copied().unwrap_or_default();
-        let (low, high) = workspace.iter().map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let (low, high) = workspace
+            .iter()
+            .map(at)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
         [low, high]
     });
     let error = |index: usize| {

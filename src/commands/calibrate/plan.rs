@@ -33,7 +33,11 @@ impl CalibrateArguments {
         if is_standard(path) {
             return Ok(());
         }
-        let by_home = if via > 0 { format!(" and {via} at home, where the direct way is barred") } else { String::new() };
+        let by_home = if via > 0 {
+            format!(" and {via} at home, where the direct way is barred")
+        } else {
+            String::new()
+        };
         Ok(print(format_args!(
             "{}: {count} poses{by_home}; next: hexad goto --config {} --table {} --output VISITED.csv --engage\n",
             path.display(),
@@ -51,7 +55,9 @@ fn route(config: &Config, constants: &Constants, mut rest: Vec<Pose>) -> (Vec<Po
         let distances = rest.iter().map(|pose| joints.distance(&here, pose)).enumerate();
         let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index);
         let next = rest.swap_remove(nearest);
-        if joints.distance(&here, &next) > 0.0 && target_motion(constants, &here, &next, 1.0, |_, _| true).is_err() {
+        if joints.distance(&here, &next) > 0.0
+            && target_motion(constants, &here, &next, 1.0, |_, _| true).is_err()
+        {
             route.push(home);
             via += 1;
         }

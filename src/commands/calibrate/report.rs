@@ -109,7 +109,9 @@ impl Errors {
 impl CalibrationReport {
     pub fn new(config: &Config, task: &Task, found: &Calibration, lines: &[u64]) -> Self {
         let over = |of: fn(&RowResult) -> &Option<nalgebra::Vector6<f64>>| {
-            Errors::from(PoseErrors::of(found.rows.iter().filter(|row| !row.is_outlier).filter_map(|row| of(row).as_ref())))
+            Errors::from(PoseErrors::of(
+                found.rows.iter().filter(|row| !row.is_outlier).filter_map(|row| of(row).as_ref()),
+            ))
         };
         let row = |(row, line): (&RowResult, &u64)| RowReport {
             line: *line,
@@ -180,19 +182,31 @@ impl CalibrationReport {
 
     fn noise_text(&self) -> (String, bool) {
         let is_large = self.noise_factor > LARGE_NOISE_FACTOR;
-        let cause = if is_large { ": the model lacks something, as play, sag or heat, or the stated noise is wrong" } else { "" };
+        let cause = if is_large {
+            ": the model lacks something, as play, sag or heat, or the stated noise is wrong"
+        } else {
+            ""
+        };
         let factor = significant(self.noise_factor);
         (format!("the residuals are {factor} times the stated noise{cause}"), is_large)
     }
 
     fn suspected_text(&self) -> String {
         let lines: Vec<_> = self.suspected_lines.iter().map(u64::to_string).collect();
-        if lines.is_empty() { "none".into() } else { format!("lines {}; they count little", lines.join(", ")) }
+        if lines.is_empty() {
+            "none".into()
+        } else {
+            format!("lines {}; they count little", lines.join(", "))
+        }
     }
 
     fn start_text(&self) -> (String, bool) {
         let is_same = self.second_start_difference < SAME_COST;
-        let text = if is_same { "finds the same minimum" } else { "finds another minimum: record more poses, or state the true --tolerance" };
+        let text = if is_same {
+            "finds the same minimum"
+        } else {
+            "finds another minimum: record more poses, or state the true --tolerance"
+        };
         (text.into(), !is_same)
     }
 }
@@ -223,7 +237,13 @@ impl fmt::Display for CalibrationReport {
             write!(f, "{}", paragraph("", &text, MAX_WIDTH))?;
         }
         write!(f, "second start: {}\nsuspected rows: {}\n", self.start_text().0, self.suspected_text())?;
-        let header = [("errors of poses", Left), ("position RMS", Right), ("worst", Right), ("angle RMS", Right), ("worst", Right)];
+        let header = [
+            ("errors of poses", Left),
+            ("position RMS", Right),
+            ("worst", Right),
+            ("angle RMS", Right),
+            ("worst", Right),
+        ];
         let rows = [
             self.before.cells("over the workspace, drawing"),
             self.after.cells("over the workspace, calibrated (expected)"),
@@ -232,12 +252,17 @@ impl fmt::Display for CalibrationReport {
             self.rows_left_out.cells("the same by the other rows"),
         ];
         writeln!(f, "\n{}", text_table(2, &header, rows))?;
-        writeln!(f, "changes of the joints [mm], each with its standard deviation; (drawn): not determined better than half of --tolerance\n")?;
+        writeln!(
+            f,
+            "changes of the joints [mm], each with its standard deviation; (drawn): not determined better than half of --tolerance\n"
+        )?;
         let header = ["joint", "x", "y", "z"].map(|name| (name, if name == "joint" { Left } else { Right }));
         let rows = self.legs.iter().zip(1..).flat_map(|(leg, number)| {
             let row = |name: String, change: &[f64; 3], deviation: &[f64; 3]| {
                 let mut cells = vec![name];
-                cells.extend(change.iter().zip(deviation).map(|(change, deviation)| self.cell(*change, *deviation)));
+                cells.extend(
+                    change.iter().zip(deviation).map(|(change, deviation)| self.cell(*change, *deviation)),
+                );
                 cells
             };
             [

@@ -26,7 +26,9 @@ pub(super) fn read_rows(
         None => read_seen(&text, path, format)?,
     };
     let (count, of_tracker) = (lengths.rows().len(), seen.len());
-    if let Some(other) = tracker && count != of_tracker {
+    if let Some(other) = tracker
+        && count != of_tracker
+    {
         return Err(Failure::before_start(format_args!(
             "{}: {of_tracker} rows, must be {count} as in {}: a row for each pose, in the same order",
             other.display(),

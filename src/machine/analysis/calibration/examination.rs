@@ -3,12 +3,10 @@
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 
 use super::model::{GEOMETRY_VALUES, Geometry, JOINT_VALUES, Row, RowTerms, Unknowns};
-use super::solve::{Minimum, chi_square, degrees};
+use super::solve::{Minimum, OUTLIER_QUANTILE, chi_square, degrees};
 use hexad_core::model::LEGS;
 use hexad_core::model::rigid::Pose;
 
-/// Standard normal quantile from which a row is suspected: one of 30,000 without an error.
-const OUTLIER_QUANTILE: f64 = 4.0;
 /// Deviation from which a direction stays as drawn, as a share of the tolerance.
 const WEAK_RATIO: f64 = 0.5;
 /// Deviations within which an error is, unless one of 370 errors is larger.
@@ -62,7 +60,8 @@ impl PoseErrors {
             let sum: f64 = squares.iter().filter_map(|it| it.get(k)).sum();
             (sum / squares.len().max(1) as f64).sqrt()
         };
-        let worst = |k: usize| squares.iter().filter_map(|it| it.get(k)).fold(0.0, |a: f64, b| a.max(*b)).sqrt();
+        let worst =
+            |k: usize| squares.iter().filter_map(|it| it.get(k)).fold(0.0, |a: f64, b| a.max(*b)).sqrt();
         Self {
             position_rms_m: mean(0),
             position_worst_m: worst(1),
@@ -141,8 +140,9 @@ impl Directions {
         variances.sort_by(|a, b| b.total_cmp(a));
         variances.truncate(GEOMETRY_VALUES - 12);
         let prior = tolerance_m.powi(2);
-        let information =
-            |variance: Option<&f64>| variance.map_or(0.0, |variance| (1.0 / variance - 1.0 / prior).max(1e-9 / prior));
+        let information = |variance: Option<&f64>| {
+            variance.map_or(0.0, |variance| (1.0 / variance - 1.0 / prior).max(1e-9 / prior))
+        };
         let is_weak = |variance: &&f64| variance.sqrt() > WEAK_RATIO * tolerance_m;
         let weak = variances.iter().filter(is_weak).count();
         let condition = information(variances.last()) / information(variances.first());
@@ -151,7 +151,12 @@ impl Directions {
 }
 
 /// Each row, with the drawn machine in its best frames and at the minimum.
-pub fn row_results(rows: &[Row], drawn: &Unknowns, minimum: &Minimum, noise: &super::model::Noise) -> Vec<RowResult> {
+pub fn row_results(
+    rows: &[Row],
+    drawn: &Unknowns,
+    minimum: &Minimum,
+    noise: &super::model::Noise,
+) -> Vec<RowResult> {
     let pairs = rows.iter().zip(&drawn.poses).zip(minimum.unknowns.poses.iter().zip(&minimum.rows));
     pairs
         .map(|((row, drawn_pose), (pose, (terms, weight)))| {

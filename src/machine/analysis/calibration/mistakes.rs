@@ -1,6 +1,7 @@
 //! Mistakes of a table that no joints within their tolerance explain, each tried against the drawn machine.
 
 use nalgebra::Vector3;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::model::{Geometry, Noise, Row, Seen, Unknowns};
 use super::solve::{Problem, median};
@@ -12,6 +13,8 @@ use hexad_core::model::machine::Machine;
 const FIXED_RATIO: f64 = 1e-9;
 /// Noise with which the frames are fitted, as a share of the radius: all residuals count alike.
 const COARSE_RATIO: f64 = 1e-3;
+/// Decrease of the cost, over it, that ends the fit of the frames.
+const COARSE_PRECISION: f64 = 1e-4;
 /// Misfit that a mistake must leave at most, as a share of the misfit without it.
 const EXPLAINED_RATIO: f64 = 0.4;
 
@@ -34,7 +37,8 @@ pub enum Mistake {
 pub fn drawn_fit(machine: &Machine, rows: &[Row]) -> Option<(Unknowns, f64)> {
     let (nominal, radius) = (Geometry::of(machine), machine.joints.radius);
     let noise = Noise { length_m: radius, position_m: radius, angle_rad: 1.0 }.scaled(COARSE_RATIO);
-    let problem = Problem { rows, nominal: &nominal, tolerance_m: FIXED_RATIO * radius, noise };
+    let tolerance_m = FIXED_RATIO * radius;
+    let problem = Problem { rows, nominal: &nominal, tolerance_m, noise, precision: COARSE_PRECISION };
     let fit = problem.minimum(start(machine, rows)?)?;
     let square = median(fit.rows.iter().map(|(terms, _)| terms.residual.norm_squared()));
     Some((fit.unknowns, noise.length_m * square.sqrt()))
@@ -42,17 +46,23 @@ pub fn drawn_fit(machine: &Machine, rows: &[Row]) -> Option<(Unknowns, f64)> {
 
 /// The mistake that explains a misfit \[m\] best, if one does.
 pub fn likely_mistake(machine: &Machine, rows: &[Row], misfit_m: f64) -> Option<Mistake> {
+    let has_reflectors = rows.iter().any(|row| matches!(row.seen, Seen::Reflectors(_)));
     let misfit = |mistake: Mistake| {
         let corrected: Vec<_> = rows.iter().map(|row| mistake.corrected(row)).collect();
         Some((mistake, drawn_fit(machine, &corrected)?.1))
     };
-    let found = all().filter_map(misfit).filter(|(_, misfit)| *misfit < EXPLAINED_RATIO * misfit_m);
+    // Reflectors do not show which axis is mirrored: the tracker's frame may have any orientation.
+    let all: Vec<_> =
+        all().filter(|it| !(has_reflectors && matches!(it, Mistake::MirroredAxis(_)))).collect();
+    let found: Vec<_> = all.into_par_iter().filter_map(misfit).collect();
+    let found = found.into_iter().filter(|(_, misfit)| *misfit < EXPLAINED_RATIO * misfit_m);
     found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(mistake, _)| mistake)
 }
 
 fn all() -> impl Iterator<Item = Mistake> {
     let pairs = (0..LEGS).flat_map(|a| (a + 1..LEGS).map(move |b| Mistake::ExchangedLegs(a, b)));
-    let units = [1e3, 1e-3].into_iter().flat_map(|unit| [Mistake::LengthUnit(unit), Mistake::TrackerUnit(unit)]);
+    let units =
+        [1e3, 1e-3].into_iter().flat_map(|unit| [Mistake::LengthUnit(unit), Mistake::TrackerUnit(unit)]);
     pairs.chain((0..3).map(Mistake::MirroredAxis)).chain([Mistake::LeftHanded]).chain(units)
 }
 

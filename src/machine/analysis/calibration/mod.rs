@@ -14,7 +14,7 @@ use self::examination::{
 };
 use self::mistakes::{Mistake, drawn_fit, likely_mistake};
 use self::model::{GEOMETRY_VALUES, Geometry, Noise, Row, Seen, Unknowns};
-use self::solve::{Minimum, Problem};
+use self::solve::{FINE_PRECISION, Minimum, Problem};
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::random::Random;
@@ -33,6 +33,8 @@ const COMBINATIONS: usize = GEOMETRY_VALUES;
 const MAX_CHANGE_RATIO: f64 = 5.0;
 /// Noise from which a mistake is searched, over the stated one.
 const MAX_NOISE_FACTOR: f64 = 10.0;
+/// Least noise over the stated one, of simulated measurements without any.
+const MIN_NOISE_FACTOR: f64 = 0.01;
 /// Predicted error of a calibration, over that of the drawing, from which it is none.
 const MAX_ERROR_RATIO: f64 = 1.0 / 3.0;
 /// Rounds in which noise and minimum are found in turn, and the change of the noise that ends them.
@@ -119,7 +121,9 @@ impl Task<'_> {
         let Self { machine, rows, tolerance_m, .. } = *self;
         self.check_count()?;
         let Some((drawn, misfit_m)) = drawn_fit(machine, rows) else {
-            return Err(likely_mistake(machine, rows, f64::INFINITY).map_or(Refusal::NoPose, Refusal::Mistake));
+            return Err(
+                likely_mistake(machine, rows, f64::INFINITY).map_or(Refusal::NoPose, Refusal::Mistake)
+            );
         };
         let far = |change_m: f64| {
             let mistake = likely_mistake(machine, rows, misfit_m);
@@ -129,14 +133,17 @@ impl Task<'_> {
             return Err(far(misfit_m));
         }
         let nominal = Geometry::of(machine);
-        let problem = |noise| Problem { rows, nominal: &nominal, tolerance_m, noise };
+        let problem =
+            |noise| Problem { rows, nominal: &nominal, tolerance_m, noise, precision: FINE_PRECISION };
         let (minimum, noise_factor) = self.minimum(&problem, &drawn).ok_or_else(|| far(misfit_m))?;
         let noise = self.noise.scaled(noise_factor);
         let change_m = (minimum.unknowns.geometry.values() - nominal.values()).amax();
         if change_m > MAX_CHANGE_RATIO * tolerance_m {
             return Err(far(change_m));
         }
-        if noise_factor > MAX_NOISE_FACTOR && let Some(mistake) = likely_mistake(machine, rows, misfit_m) {
+        if noise_factor > MAX_NOISE_FACTOR
+            && let Some(mistake) = likely_mistake(machine, rows, misfit_m)
+        {
             return Err(Refusal::Mistake(mistake));
         }
         let second = problem(noise).minimum(self.second_start(&drawn)).map_or(f64::NAN, |second| second.cost);
@@ -193,7 +200,7 @@ impl Task<'_> {
             if (change - 1.0).abs() < NOISE_CHANGE {
                 break;
             }
-            factor *= change;
+            factor = (factor * change).max(MIN_NOISE_FACTOR);
             minimum = problem(self.noise.scaled(factor)).minimum(minimum.unknowns)?;
         }
         Some((minimum, factor))
@@ -211,7 +218,8 @@ impl Task<'_> {
             size * random.signed()
         };
         let shared = DVector::from_fn(drawn.shared_count(), |k, _| step(k));
-        let poses: Vec<_> = drawn.poses.iter().map(|_| Vector6::from_fn(|k, _| step(GEOMETRY_VALUES + k))).collect();
+        let poses: Vec<_> =
+            drawn.poses.iter().map(|_| Vector6::from_fn(|k, _| step(GEOMETRY_VALUES + k))).collect();
         drawn.displaced(&shared, &poses)
     }
 }
@@ -227,4 +235,3 @@ pub fn offsets(machine: &Machine, rows: &[(Vector6<f64>, Pose)]) -> ([f64; LEGS]
     let deviations = (each.len() > 1).then(|| (squares / (count - 1.0) / count).map(f64::sqrt).into());
     (mean.into(), deviations)
 }
-

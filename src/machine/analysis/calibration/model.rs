@@ -117,11 +117,7 @@ impl Noise {
     /// All deviations times a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         let Self { length_m, position_m, angle_rad } = *self;
-        Self {
-            length_m: factor * length_m,
-            position_m: factor * position_m,
-            angle_rad: factor * angle_rad,
-        }
+        Self { length_m: factor * length_m, position_m: factor * position_m, angle_rad: factor * angle_rad }
     }
 }
 
@@ -245,10 +241,7 @@ impl Unknowns {
             let by_turn = (Matrix3::identity() - cross / 2.0 + cross * cross / 12.0) * weight;
             terms.residual.fixed_rows_mut::<3>(at).copy_from(&(error * weight));
             terms.shared.fixed_view_mut::<3, 3>(at, GEOMETRY_VALUES).copy_from(&by_turn);
-            terms
-                .shared
-                .fixed_view_mut::<3, 3>(at, GEOMETRY_VALUES + 6)
-                .copy_from(&(by_turn * of_platform));
+            terms.shared.fixed_view_mut::<3, 3>(at, GEOMETRY_VALUES + 6).copy_from(&(by_turn * of_platform));
             terms.pose.fixed_view_mut::<3, 3>(at, 0).copy_from(&(by_turn * rotation));
         }
         terms

@@ -50,7 +50,7 @@ pub fn spread_poses(
     (0..count).map(draw).collect()
 }
 
-/// Indices of `count` poses of the candidates, of which each may be taken several times.
+/// Indices of `count` poses of the candidates, each once.
 pub fn plan(
     machine: &Machine,
     candidates: &[Pose],
@@ -63,7 +63,8 @@ pub fn plan(
         candidates.iter().map(|pose| sensitivity(machine, pose, noise).unwrap_or(absent.clone())).collect();
     let mut covariance = DMatrix::identity(GEOMETRY_VALUES + 12, GEOMETRY_VALUES + 12);
     (0..GEOMETRY_VALUES).for_each(|k| covariance[(k, k)] = tolerance_m.powi(2));
-    let (mut design, mut chosen) = (Design { sensitivities, covariance }, vec![]);
+    let is_taken = vec![false; candidates.len()];
+    let (mut design, mut chosen) = (Design { sensitivities, is_taken, covariance }, vec![]);
     for _ in 0..count {
         chosen.extend(design.add_best());
     }
@@ -86,6 +87,7 @@ pub fn plan(
 /// Candidates, and the covariance with those that were chosen.
 struct Design {
     sensitivities: Vec<MatrixXx6<f64>>,
+    is_taken: Vec<bool>,
     covariance: DMatrix<f64>,
 }
 
@@ -96,15 +98,19 @@ impl Design {
             let spread = self.covariance.tr_mul(g);
             (Matrix6::identity() + g.tr_mul(&spread)).determinant()
         };
-        let gains = self.sensitivities.iter().map(gain).enumerate();
-        let (best, _) = gains.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let free =
+            self.sensitivities.iter().zip(&self.is_taken).enumerate().filter(|(_, (_, taken))| !**taken);
+        let (best, _) = free.map(|(index, (g, _))| (index, gain(g))).max_by(|a, b| a.1.total_cmp(&b.1))?;
         self.update(best, 1.0);
         Some(best)
     }
 
     /// The covariance with a row more or less (Woodbury).
     fn update(&mut self, index: usize, sign: f64) {
-        let Some(g) = self.sensitivities.get(index) else { return };
+        let (Some(g), Some(is_taken)) = (self.sensitivities.get(index), self.is_taken.get_mut(index)) else {
+            return;
+        };
+        *is_taken = sign > 0.0;
         let spread = self.covariance.tr_mul(g);
         let inner = Matrix6::identity() + g.tr_mul(&spread) * sign;
         let factor = inner.cholesky().map(|inner| inner.l());

@@ -16,8 +16,8 @@ use super::model::{GEOMETRY_VALUES, Geometry, Noise, Row, RowTerms, Unknowns};
 
 /// Most steps; most problems need ten.
 const MAX_STEPS: usize = 100;
-/// Decrease of the cost below which the minimum is reached, as a share of the cost.
-const MIN_DECREASE: f64 = 1e-13;
+/// Precision of a minimum that is reached to rounding.
+pub const FINE_PRECISION: f64 = 1e-13;
 /// First damping as a share of the diagonal; its factor after each step that succeeds or fails; damping at which no step succeeds.
 const FIRST_DAMPING: f64 = 1e-4;
 const DAMPING_DECREASE: f64 = 0.1;
@@ -26,6 +26,10 @@ const MAX_DAMPING: f64 = 1e12;
 /// Standard normal quantiles of the squared residual from which a row counts less (99.9 %), and of the median.
 const HUBER_QUANTILE: f64 = 3.09;
 const MEDIAN_QUANTILE: f64 = 0.0;
+/// The same from which a row is suspected: one of 30,000 without an error.
+pub const OUTLIER_QUANTILE: f64 = 4.0;
+/// Equations beyond the values that they determine from which on residuals show the noise.
+const MIN_EQUATIONS_LEFT: f64 = 20.0;
 
 /// Measurements, their noise, and what is known before.
 #[derive(Clone, Copy)]
@@ -38,6 +42,8 @@ pub struct Problem<'a> {
     pub tolerance_m: f64,
     /// Of the measurements.
     pub noise: Noise,
+    /// Decrease of the cost, over it, below which the minimum is reached.
+    pub precision: f64,
 }
 
 /// Minimum of the cost.
@@ -102,7 +108,7 @@ impl Problem<'_> {
                     damping *= DAMPING_INCREASE;
                     continue;
                 };
-                is_last = cost - new_cost <= MIN_DECREASE * cost;
+                is_last = cost - new_cost <= self.precision * cost;
                 (unknowns, terms, cost) = (next, new_terms, new_cost);
                 damping = (damping * DAMPING_DECREASE).max(1e-15);
                 break;
@@ -182,20 +188,26 @@ impl RowNormal {
 }
 
 impl Minimum {
-    /// Real over stated noise, by the median of the rows; 1 if the rows are too few to show it.
+    /// Real over stated noise; 1 if the rows are too few to show it.
     pub fn noise_factor(&self, tolerance_m: f64) -> f64 {
         let equations: usize = self.rows.iter().map(|(terms, _)| degrees(terms)).sum();
-        // Values that the rows determine: those whose deviation they have made smaller than the prior's count.
+        // Of the values, what the rows know better than the prior.
         let from_prior = self.covariance.diagonal().rows(0, GEOMETRY_VALUES).sum() / tolerance_m.powi(2);
-        let determined = self.covariance.nrows() as f64 - from_prior;
-        let left = equations as f64 - determined;
-        if left < 20.0 {
+        let left = equations as f64 - (self.covariance.nrows() as f64 - from_prior);
+        if left < MIN_EQUATIONS_LEFT {
             return 1.0;
         }
-        let ratio = |(terms, _): &(RowTerms, f64)| {
-            terms.residual.norm_squared() / chi_square(degrees(terms), MEDIAN_QUANTILE)
+        let pair = |(terms, _): &(RowTerms, f64)| (terms.residual.norm_squared(), degrees(terms));
+        let inliers =
+            self.rows.iter().map(pair).filter(|(square, n)| *square < chi_square(*n, OUTLIER_QUANTILE));
+        let (squares, counted) = inliers.fold((0.0, 0), |(sum, all), (square, n)| (sum + square, all + n));
+        let ratio = if 2 * counted > equations {
+            squares / counted as f64
+        } else {
+            // Most rows seem to be outliers: the stated noise is far too small.
+            median(self.rows.iter().map(pair).map(|(square, n)| square / chi_square(n, MEDIAN_QUANTILE)))
         };
-        (median(self.rows.iter().map(ratio)) * equations as f64 / left).sqrt()
+        (ratio * equations as f64 / left).sqrt()
     }
 }
 
