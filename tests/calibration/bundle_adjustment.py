@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 HUBER_QUANTILE = 3.09
 STEP = 1e-6
+# Of weights and least squares in turn.
+ROUNDS = 15
 
 
 def pose(rows):
@@ -64,14 +66,18 @@ def rows(u):
     return np.hstack(parts)
 
 
-def residuals(u):
+def losses(u):
+    """Huber's loss of each row, and its derivative by the squared residual."""
     each = rows(u)
     n = each.shape[1] - 6
     bound = n * (1 - 2 / (9 * n) + HUBER_QUANTILE * np.sqrt(2 / (9 * n))) ** 3
-    square = np.sum(each**2, axis=1)
-    loss = np.where(square <= bound, square, 2 * np.sqrt(bound * np.maximum(square, bound)) - bound)
-    weighted = each * np.sqrt(loss / np.maximum(square, 1e-300))[:, None]
-    return np.concatenate([weighted.ravel(), u[:42] / case["tolerance"]])
+    square = np.maximum(np.sum(each**2, axis=1), 1e-300)
+    is_within = square <= bound
+    return np.where(is_within, square, 2 * np.sqrt(bound * square) - bound), np.where(is_within, 1, np.sqrt(bound / square))
+
+
+def residuals(u):
+    return np.concatenate([(rows(u) * np.sqrt(weights)[:, None]).ravel(), u[:42] / case["tolerance"]])
 
 
 def jacobian(u):
@@ -93,6 +99,8 @@ def jacobian(u):
     return found
 
 
-start = np.zeros(shared + 6 * count)
-result = least_squares(residuals, start, jac=jacobian, method="lm", x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15)
-print(repr(2 * float(result.cost)))
+u = np.zeros(shared + 6 * count)
+for _ in range(ROUNDS):
+    weights = losses(u)[1]
+    u = least_squares(residuals, u, jac=jacobian, method="lm", x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15).x
+print(repr(float(np.sum(losses(u)[0]) + np.sum((u[:42] / case["tolerance"]) ** 2))))

@@ -163,8 +163,10 @@ fn what_is_no_calibration_is_refused_with_the_reason() {
     refused(lines[..6].join("\n") + "\n", 1, &["5 rows: must be 7 at least"]);
     folder.write("poses.csv", &good);
     folder.write("short.csv", lines[..9].join("\n") + "\n");
-    folder
-        .refuses("calibrate @M @/poses.csv --tracker @/short.csv", &[&format!("short.csv: 8 rows, must be {} as in ", poses.len())]);
+    folder.refuses(
+        "calibrate @M @/poses.csv --tracker @/short.csv",
+        &[&format!("short.csv: 8 rows, must be {} as in ", poses.len())],
+    );
     folder.refuses("calibrate @M", &["<POSES>"]);
     folder.refuses("calibrate @M --plan 20", &["--output"]);
     let points = good.replace(

@@ -22,7 +22,8 @@ use crate::support::trio::{start_daemon, start_plant};
 const GUIDE: &str = include_str!("../../docs/calibration.md");
 /// Fewer than the guide's 60, to save time.
 const POSES: &str = "--plan 16";
-const BUILT: &str = "[plant.build]\njoint_error_m = 1e-3\n[plant.sensor]\nlength_noise_m = 2e-6\n";
+const BUILT: &str = "[plant.build]\njoint_error_m = 1e-3\n[plant.sensor]\nlength_noise_m = 2e-6\n\
+                     [measured]\nlength_noise_m = 2e-6\n";
 const TRACKER: [f64; 6] = [0.4, -0.3, 2.0, 3.0, -1.0, 0.5];
 const PROBE: [f64; 6] = [-0.2, 0.5, 0.1, 0.02, 0.05, 0.1];
 

@@ -23,10 +23,26 @@ const CANDIDATE_SEED: u64 = 1;
 impl CalibrateArguments {
     /// Writes the table of targets.
     pub(super) fn write_plan(&self, config: &Config, count: usize, path: &Path) -> Result<(), Failure> {
-        let candidates = workspace(config, CANDIDATES, CANDIDATE_SHARES, CANDIDATE_SEED);
-        let chosen = plan(&config.machine, &candidates, count, &self.noise(), self.tolerance);
-        let chosen: Vec<_> = chosen.iter().filter_map(|index| candidates.get(*index).copied()).collect();
-        let (poses, via) = route(config, &constants(config), chosen);
+        let (constants, home) = (constants(config), config.machine.home_pose());
+        let mut candidates = workspace(config, CANDIDATES, CANDIDATE_SHARES, CANDIDATE_SEED);
+        let chosen = loop {
+            let chosen = plan(&config.machine, &candidates, count, &self.noise(), self.tolerance);
+            let chosen: Vec<_> = chosen.iter().filter_map(|index| candidates.get(*index).copied()).collect();
+            let is_barred =
+                |pose: &&Pose| !has_way(&constants, &home, pose) || !has_way(&constants, pose, &home);
+            let barred: Vec<_> = chosen.iter().filter(is_barred).collect();
+            if barred.is_empty() {
+                break chosen;
+            }
+            candidates.retain(|pose| !barred.contains(&pose));
+        };
+        if chosen.len() < count {
+            return Err(Failure::after_start(format_args!(
+                "{} poses at the edge of the workspace have a direct way home, must be {count}; state fewer, or a larger [envelope]",
+                chosen.len()
+            )));
+        }
+        let (poses, via) = route(config, &constants, chosen);
         let mut table = CsvWriter::new(&coordinates(""));
         poses.iter().for_each(|pose| table.row(task_coordinates(pose, &config.machine.home)));
         table.save(path).map_err(Failure::before_start)?;
@@ -65,4 +81,9 @@ fn route(config: &Config, constants: &Constants, mut rest: Vec<Pose>) -> (Vec<Po
         here = next;
     }
     (route, via)
+}
+
+/// Whether the reference goes directly from one pose to another.
+fn has_way(constants: &Constants, from: &Pose, to: &Pose) -> bool {
+    target_motion(constants, from, to, 1.0, |_, _| true).is_ok()
 }

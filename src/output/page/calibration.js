@@ -39,22 +39,24 @@ function drawMap({ axes, ranges, cells }, which, title) {
   const limit = Math.max(...cells.filter(Boolean).map((cell) => cell[which]));
   const size = 220 / side;
   const shapes = cells.flatMap((cell, k) => cell ? [["rect", {
-    x: 30 + size * (k % side), y: 230 - size * (1 + Math.floor(k / side)), width: size + 0.3, height: size + 0.3,
-    fill: "var(--accent)", "fill-opacity": (0.06 + (0.94 * cell[which]) / limit).toFixed(3),
+    x: 30 + size * (k % side), y: 236 - size * (1 + Math.floor(k / side)), width: size, height: size,
+    "shape-rendering": "crispEdges", fill: "var(--accent)", "fill-opacity": (0.06 + (0.94 * cell[which]) / limit).toFixed(3),
   }]] : []);
   const end = (value, axis) => quantityText(value, axis.length > 1 ? "rad" : "m");
-  shapes.push(label(30, 248, end(ranges[0][0], axes[0])), label(250, 248, end(ranges[0][1], axes[0]), "end"), label(140, 248, axes[0], "middle"));
-  shapes.push(label(30, 8, `${axes[1]} up to ${end(ranges[1][1], axes[1])}, from ${end(ranges[1][0], axes[1])}`));
-  picture("maps", `${title}, up to ${quantityText(limit, "m")}`, 260, 255, shapes);
+  shapes.push(label(30, 251, end(ranges[0][0], axes[0])), label(250, 251, end(ranges[0][1], axes[0]), "end"), label(140, 251, axes[0], "middle"));
+  shapes.push(label(30, 11, `${axes[1]} up to ${end(ranges[1][1], axes[1])}, from ${end(ranges[1][0], axes[1])}`));
+  picture("maps", `${title}, up to ${quantityText(limit, "m")}`, 260, 258, shapes);
 }
 
 function drawJoints(joints, title) {
   const extent = Math.max(...joints.flatMap(([place]) => place.map(Math.abs)), 1e-9);
   const largest = Math.max(...joints.map(([, shift]) => Math.hypot(...shift)), 1e-12);
-  const factor = 10 ** Math.floor(Math.log10((0.4 * extent) / largest));
+  const wanted = (0.4 * extent) / largest;
+  const decade = 10 ** Math.floor(Math.log10(wanted));
+  const factor = decade * [5, 2, 1].find((step) => step * decade <= wanted);
   [[0, 1], [0, 2], [1, 2]].forEach(([a, b]) => {
     const middle = [a, b].map((axis) => joints.reduce((sum, [place]) => sum + place[axis] / joints.length, 0));
-    const at = (place, shift, k) => 125 + (k ? -1 : 1) * (85 / extent) * (place[[a, b][k]] - middle[k] + shift[[a, b][k]] * (factor - 1) * 1);
+    const at = (place, shift, k) => 125 + (k ? -1 : 1) * (85 / extent) * (place[[a, b][k]] - middle[k] + shift[[a, b][k]] * (factor - 1));
     const shapes = joints.flatMap(([place, shift], leg) => {
       const drawn = place.map((value, axis) => value - shift[axis]);
       const [x1, y1] = [0, 1].map((k) => at(drawn, [0, 0, 0], k));
