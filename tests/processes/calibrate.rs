@@ -80,6 +80,7 @@ fn a_platform_with_other_joints_is_calibrated_as_the_guide_says() {
     let imperfections = &config.deployment.plant.imperfections;
     let truth = imperfections.build.built(&config.machine, &mut Random::new(imperfections.seed));
     let (plant, daemon) = (start_plant(&machine), start_daemon(&machine));
+    daemon.says("standby: no setpoint");
     type_line(&machine, "hexad calibrate --config F --plan 60 --output TARGETS.csv");
     type_line(&machine, "hexad goto --config F --table TARGETS.csv --output VISITED.csv --engage");
 
@@ -110,6 +111,7 @@ fn a_platform_with_other_joints_is_calibrated_as_the_guide_says() {
     fs::write(&machine.file, &new).unwrap();
     let (calibrated, mut random) = (Config::load(&machine.file).unwrap().machine, Random::new(6));
     let daemon = start_daemon(&machine);
+    daemon.says("standby: no setpoint");
     let mut unused = "alpha,beta,gamma,x,y,z\n".to_owned();
     for _ in 0..50 {
         let mut x = calibrated.home;

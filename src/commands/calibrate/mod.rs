@@ -157,9 +157,9 @@ fn workspace(config: &Config, count: usize, shares: [f64; 2], seed: u64) -> Vec<
 fn new_joints(found: &Calibration) -> Vec<NewValue> {
     let deviations = &found.deviations_m;
     let joint = |key: &str, leg: usize, first: usize, place: nalgebra::Vector3<f64>| {
-        let estimate =
-            |axis: usize| Estimate { value: place[axis], deviation: deviations[first + 3 * leg + axis] };
-        let value = NewNumbers::Array((0..3).map(estimate).collect());
+        let of_joint = place.iter().zip(deviations.iter().skip(first + 3 * leg));
+        let estimate = |(value, deviation): (&f64, &f64)| Estimate { value: *value, deviation: *deviation };
+        let value = NewNumbers::Array(of_joint.map(estimate).collect());
         NewValue { key: format!("leg[{}].{key}", leg + 1), value }
     };
     let geometry = &found.geometry;

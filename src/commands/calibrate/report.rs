@@ -2,12 +2,13 @@
 
 use core::fmt;
 
+use nalgebra::{DVector, Vector6};
 use serde::Serialize;
 
 use crate::commands::report::summary::Fact;
 use hexad_core::model::LEGS;
 use hexad_machine::analysis::calibration::examination::{PoseErrors, RowResult};
-use hexad_machine::analysis::calibration::model::{GEOMETRY_VALUES, Geometry, JOINT_VALUES, Seen};
+use hexad_machine::analysis::calibration::model::{Geometry, JOINT_VALUES, Seen};
 use hexad_machine::analysis::calibration::{Calibration, Task};
 use hexad_machine::config::Config;
 use hexad_machine::text::numbers::{readable, significant};
@@ -108,7 +109,7 @@ impl Errors {
 
 impl CalibrationReport {
     pub fn new(config: &Config, task: &Task, found: &Calibration, lines: &[u64]) -> Self {
-        let over = |of: fn(&RowResult) -> &Option<nalgebra::Vector6<f64>>| {
+        let over = |of: fn(&RowResult) -> &Option<Vector6<f64>>| {
             Errors::from(PoseErrors::of(
                 found.rows.iter().filter(|row| !row.is_outlier).filter_map(|row| of(row).as_ref()),
             ))
@@ -213,7 +214,8 @@ impl CalibrationReport {
 
 fn leg_values(nominal: &Geometry, found: &Calibration) -> [LegValues; LEGS] {
     let (values, change) = (found.geometry.values(), found.geometry.values() - nominal.values());
-    let three = |of: &nalgebra::DVector<f64>, first: usize| [of[first], of[first + 1], of[first + 2]];
+    let one = |of: &DVector<f64>, index: usize| of.get(index).copied().unwrap_or_default();
+    let three = |of: &DVector<f64>, first: usize| [0, 1, 2].map(|axis| one(of, first + axis));
     let deviations = &found.deviations_m;
     core::array::from_fn(|leg| {
         let [base, platform, offset] = [3 * leg, JOINT_VALUES / 2 + 3 * leg, JOINT_VALUES + leg];
@@ -224,8 +226,8 @@ fn leg_values(nominal: &Geometry, found: &Calibration) -> [LegValues; LEGS] {
             platform_m: three(&values, platform),
             platform_change_m: three(&change, platform),
             platform_deviation_m: three(deviations, platform),
-            offset_m: values[offset.min(GEOMETRY_VALUES - 1)],
-            offset_deviation_m: deviations[offset],
+            offset_m: one(&values, offset),
+            offset_deviation_m: one(deviations, offset),
         }
     })
 }

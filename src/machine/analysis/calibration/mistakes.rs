@@ -1,6 +1,6 @@
 //! Mistakes of a table that no joints within their tolerance explain, each tried against the drawn machine.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::model::{Geometry, Noise, Row, Seen, Unknowns};
@@ -74,15 +74,16 @@ impl Mistake {
             Self::ExchangedLegs(a, b) => row.lengths.swap_rows(a, b),
             Self::LengthUnit(factor) => row.lengths *= factor,
             Self::TrackerUnit(factor) => row.seen.for_each_place(|place| *place *= factor),
-            Self::MirroredAxis(axis) => row.seen.for_each_place(|place| place[axis] = -place[axis]),
+            Self::MirroredAxis(axis) => {
+                let mut signs = Vector3::repeat(1.0);
+                signs.iter_mut().skip(axis).take(1).for_each(|sign| *sign = -1.0);
+                row.seen.for_each_place(|place| place.component_mul_assign(&signs));
+            }
             Self::LeftHanded => {
-                row.seen.for_each_place(|place| place.z = -place.z);
+                let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
+                row.seen.for_each_place(|place| *place = mirror * *place);
                 if let Seen::Probe(pose) = &mut row.seen {
-                    // M R M with M = diag(1, 1, -1).
-                    for k in 0..2 {
-                        pose.rotation[(k, 2)] = -pose.rotation[(k, 2)];
-                        pose.rotation[(2, k)] = -pose.rotation[(2, k)];
-                    }
+                    pose.rotation = mirror * pose.rotation * mirror;
                 }
             }
         }

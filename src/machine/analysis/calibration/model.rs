@@ -72,15 +72,15 @@ impl Geometry {
             let arm = pose.rotation * self.platform.column(leg);
             let s = pose.position + arm - self.base.column(leg);
             let (length, n) = (s.norm(), s.normalize());
-            lengths[leg] = length - self.offset[leg];
+            lengths.fixed_rows_mut::<1>(leg).fill(length);
             by_pose.fixed_view_mut::<1, 3>(leg, 0).copy_from(&arm.cross(&n).transpose());
             by_pose.fixed_view_mut::<1, 3>(leg, 3).copy_from(&n.transpose());
             by_values.fixed_view_mut::<1, 3>(leg, 3 * leg).copy_from(&-n.transpose());
             let on_platform = pose.rotation.tr_mul(&n).transpose();
             by_values.fixed_view_mut::<1, 3>(leg, JOINT_VALUES / 2 + 3 * leg).copy_from(&on_platform);
-            by_values[(leg, JOINT_VALUES + leg)] = -1.0;
         }
-        (lengths, by_pose, by_values)
+        by_values.view_mut((0, JOINT_VALUES), (LEGS, LEGS)).fill_diagonal(-1.0);
+        (lengths - self.offset, by_pose, by_values)
     }
 }
 

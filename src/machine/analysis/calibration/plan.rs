@@ -62,7 +62,7 @@ pub fn plan(
     let sensitivities: Vec<_> =
         candidates.iter().map(|pose| sensitivity(machine, pose, noise).unwrap_or(absent.clone())).collect();
     let mut covariance = DMatrix::identity(GEOMETRY_VALUES + 12, GEOMETRY_VALUES + 12);
-    (0..GEOMETRY_VALUES).for_each(|k| covariance[(k, k)] = tolerance_m.powi(2));
+    covariance.view_mut((0, 0), (GEOMETRY_VALUES, GEOMETRY_VALUES)).fill_diagonal(tolerance_m.powi(2));
     let is_taken = vec![false; candidates.len()];
     let (mut design, mut chosen) = (Design { sensitivities, is_taken, covariance }, vec![]);
     for _ in 0..count {

@@ -137,7 +137,7 @@ impl Problem<'_> {
             Normal { shared: DMatrix::zeros(count, count), gradient: DVector::zeros(count), rows: vec![] };
         let change = unknowns.geometry.values() - self.nominal.values();
         normal.gradient.rows_mut(0, GEOMETRY_VALUES).copy_from(&(change * weight));
-        (0..GEOMETRY_VALUES).for_each(|k| normal.shared[(k, k)] = weight);
+        normal.shared.view_mut((0, 0), (GEOMETRY_VALUES, GEOMETRY_VALUES)).fill_diagonal(weight);
         for terms in terms {
             let (_, weight) = loss(terms);
             normal.shared += terms.shared.tr_mul(&terms.shared) * weight;
@@ -152,11 +152,13 @@ impl Problem<'_> {
     }
 }
 
+/// Equations without the poses: factorized matrix, right side, and each row over the factor of its block.
+type Reduced = (Cholesky<f64, Dyn>, DVector<f64>, Vec<RowNormal>);
+
 impl Normal {
-    /// Equations without the poses: factorized matrix, right side, and each row over the factor of its block.
-    fn reduced(&self, damping: f64) -> Option<(Cholesky<f64, Dyn>, DVector<f64>, Vec<RowNormal>)> {
+    fn reduced(&self, damping: f64) -> Option<Reduced> {
         let (mut matrix, mut right) = (self.shared.clone(), -&self.gradient);
-        (0..matrix.nrows()).for_each(|k| matrix[(k, k)] *= 1.0 + damping);
+        matrix.set_diagonal(&(matrix.diagonal() * (1.0 + damping)));
         let rows: Vec<_> = self.rows.iter().map(|row| row.factorized(damping)).collect::<Option<_>>()?;
         for row in &rows {
             matrix -= row.cross.tr_mul(&row.cross);
@@ -180,7 +182,7 @@ impl RowNormal {
     /// With the block `B = L L^T`: L, and `L^-1` times the others.
     fn factorized(&self, damping: f64) -> Option<Self> {
         let mut block = self.block;
-        (0..6).for_each(|k| block[(k, k)] *= 1.0 + damping);
+        block.set_diagonal(&(block.diagonal() * (1.0 + damping)));
         let factor = block.cholesky()?.l();
         let cross = factor.solve_lower_triangular(&self.cross)?;
         Some(Self { block: factor, cross, gradient: factor.solve_lower_triangular(&self.gradient)? })

@@ -29,9 +29,8 @@ pub fn start(machine: &Machine, rows: &[Row]) -> Option<Unknowns> {
     };
     let poses: Vec<_> = rows.iter().map(by_lengths).collect();
     let seen = probes(rows);
-    let known: Vec<_> = poses.iter().zip(&seen).filter_map(|(pose, seen)| Some((*pose, *seen))).collect();
-    let pairs: Vec<(Pose, Pose)> =
-        known.into_iter().filter_map(|(pose, seen)| Some((pose?, seen?))).collect();
+    let pairs = poses.iter().zip(&seen).filter_map(|(pose, seen)| Some(((*pose)?, (*seen)?)));
+    let pairs: Vec<(Pose, Pose)> = pairs.collect();
     if pairs.len() < MIN_ROWS.max(rows.len() / 2) {
         return None;
     }
@@ -108,11 +107,13 @@ fn probes(rows: &[Row]) -> Vec<Option<Pose>> {
     rows.iter().map(probe).collect()
 }
 
+/// A point before and after a motion.
+type Pair = (Vector3<f64>, Vector3<f64>);
+
 /// The rigid motion that takes the first of each pair nearest to the second (Kabsch).
-pub fn fitted(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Pose> {
-    let mean = |of: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| {
-        pairs.iter().map(of).sum::<Vector3<f64>>() / pairs.len() as f64
-    };
+pub fn fitted(pairs: &[Pair]) -> Option<Pose> {
+    let mean =
+        |of: fn(&Pair) -> Vector3<f64>| pairs.iter().map(of).sum::<Vector3<f64>>() / pairs.len() as f64;
     let (from, to) = (mean(|pair| pair.0), mean(|pair| pair.1));
     let rotation = nearest_rotation(&pairs.iter().map(|(a, b)| (b - to) * (a - from).transpose()).sum())?;
     Some(Pose { rotation, position: to - rotation * from })
@@ -122,10 +123,9 @@ pub fn fitted(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Pose> {
 fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let svd = matrix.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
-    let mut sign = Matrix3::identity();
     // The smallest singular value is the last.
-    sign[(2, 2)] = (u * v_t).determinant().signum();
-    Some(u * sign * v_t)
+    let signs = Vector3::new(1.0, 1.0, (u * v_t).determinant().signum());
+    Some(u * Matrix3::from_diagonal(&signs) * v_t)
 }
 
 /// The second pose, given in the frame of the first.
