@@ -197,7 +197,7 @@ impl CalibrationReport {
         if lines.is_empty() {
             "none".into()
         } else {
-            format!("lines {}; they count little", lines.join(", "))
+            format!("those of line {}, which count little", lines.join(", "))
         }
     }
 
