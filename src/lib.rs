@@ -53,6 +53,7 @@
 //! | axial, transverse | along a leg; normal to it |
 //! | bridge | process that connects a machine with a network: for the daemon a setpoint source, an operator and a reader |
 //! | brakes | hold the legs while forces are disabled |
+//! | calibration | joints and zeros of the lengths from poses that a tracker has measured, see [`analysis::calibration`] |
 //! | clear | operator request that ends a fault, after inspection |
 //! | computed torque | control law: inverse dynamics of the desired acceleration plus feedback on the tracking error |
 //! | condition | ratio of the largest to the smallest amplification of leg forces, see [`model::sensitivity`] |
@@ -94,6 +95,7 @@
 //! | policy | reaction to a setpoint that the limits do not allow: `stop` or `limit`, `[setpoint] on_violation` |
 //! | prefault | touch memory in advance, so that no cycle causes a page fault |
 //! | recording | file with every cycle of a run: timing, input, output, see [`recording`] |
+//! | reflector, probe | what a tracker sees on the platform: a point, a body with orientation |
 //! | reference | motion that the controller tracks; generated from the target, within all limits |
 //! | reference generator | moves the reference towards the target, only to states with a verified stop |
 //! | regressor | matrix that takes inertial parameters to forces, see [`model::regressor`] |
@@ -115,6 +117,7 @@
 //! | target | goal of the reference: the setpoint, or a pose to hold |
 //! | timeline | hold, approach, settle, motion, settle |
 //! | tool frame | frame fixed in the platform; a tool turns about its origin, see [`motion::frames`] |
+//! | tracker | instrument that measures the platform from outside: laser tracker, camera, coordinate measuring machine |
 //! | trusted step | change of pose for which Newton's method is proved to find the only solution |
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
 //! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |

@@ -18,6 +18,7 @@ use hexad::commands::CommandLine;
 use hexad::config::Config;
 use tempfile::TempDir;
 
+mod calibration;
 mod damage;
 mod output;
 mod pages;

@@ -1,6 +1,7 @@
 //! The mathematics of the machine and its simulated platform, against independent references.
 
 mod batch;
+mod calibration;
 mod excitation;
 mod fidelity;
 mod identification;

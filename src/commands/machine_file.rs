@@ -88,6 +88,9 @@ type Changed = Option<Option<String>>;
 /// Sets the value at the end of a path below a table, with the comment behind the outermost value.
 fn set(table: &mut dyn TableLike, path: &str, new: &NewValue, is_inline: bool) -> Result<Changed, Failure> {
     let (name, below) = path.split_once('.').unwrap_or((path, ""));
+    if let Some((sections, number)) = name.strip_suffix(']').and_then(|name| name.split_once('[')) {
+        return set(section(table, sections, number, new)?, below, new, false);
+    }
     let of_type = |found: &Item, expected| wrong_type(&new.key, found.type_name(), expected);
     let is_new = !table.contains_key(name);
     if is_new {
@@ -106,6 +109,21 @@ fn set(table: &mut dyn TableLike, path: &str, new: &NewValue, is_inline: bool) -
         comment(value.decor_mut(), below, old.clone(), new);
     }
     Ok(changed)
+}
+
+/// One of several sections with the same name, by its number from 1: `leg[3]` is the third `[[leg]]`.
+fn section<'t>(
+    table: &'t mut dyn TableLike,
+    name: &str,
+    number: &str,
+    new: &NewValue,
+) -> Result<&'t mut dyn TableLike, Failure> {
+    let found = table.get(name).map_or("none", Item::type_name);
+    let index = number.parse().ok().and_then(|number: usize| number.checked_sub(1));
+    let sections = table.get_mut(name).and_then(Item::as_array_of_tables_mut);
+    let section = sections.zip(index).and_then(|(sections, index)| sections.get_mut(index));
+    let expected = format!("an array of tables, [[{name}]]");
+    section.map(|section| section as &mut dyn TableLike).ok_or_else(|| wrong_type(&new.key, found, &expected))
 }
 
 /// Adds a value, with the indentation of the key above, or a table.

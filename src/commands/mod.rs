@@ -15,6 +15,7 @@ use hexad_machine::log::{FORMAT_VARIABLE, LogFormat};
 
 pub mod advise;
 mod arguments;
+mod calibrate;
 pub mod check;
 mod confirm_legs;
 mod convert;
@@ -114,6 +115,8 @@ enum CommandArguments {
     Check(check::CheckArguments),
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
     Doctor(doctor::DoctorArguments),
+    /// Calibrate the joints and the zeros of the lengths from poses that a tracker has measured
+    Calibrate(calibrate::CalibrateArguments),
     /// Identify masses, friction and force scales of the machine from recordings of its motions
     Identify(identify::IdentifyArguments),
     /// Show the error and the time of each model fidelity over an envelope or a trajectory, and recommend one
@@ -175,6 +178,7 @@ impl CommandLine {
             Is::Frame(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
             Is::Doctor(arguments) => arguments.execute(),
+            Is::Calibrate(arguments) => arguments.execute(),
             Is::Identify(arguments) => arguments.execute(),
             Is::Advise(arguments) => arguments.execute(),
             Is::Workspace(arguments) => arguments.execute(),

@@ -22,6 +22,7 @@ mod test_threads;
 
 mod alone;
 mod always_stops;
+mod calibrate;
 mod confirmed_legs;
 mod control_socket;
 mod doctor;

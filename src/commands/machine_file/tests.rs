@@ -179,6 +179,17 @@ fn arrays_keep_their_layout_and_replace_a_number() {
 }
 
 #[test]
+fn one_of_several_sections_is_named_by_its_number() {
+    let text = "[[leg]]\nx = [1.0, 2.0]\n\n# second\n[[leg]]\nx = [3.0, 4.0] # own\n";
+    let expected = text.replace("[3.0, 4.0] # own", "[3.0, 4.5] # own # was [3.0, 4.0], +- [0.1, 0.1]");
+    assert_eq!(edited(text, &[array("leg[2].x", &[3.0, 4.5], 0.1)]).unwrap(), expected);
+    for (key, text) in [("leg[3].x", text), ("leg[0].x", text), ("leg[1].x", "leg = [{ x = [1, 2] }]")] {
+        let error = edited(text, &[array(key, &[1.0, 2.0], 0.1)]).unwrap_err().to_string();
+        assert!(error.starts_with(key) && error.contains("must be an array of tables, [[leg]]"), "{error}");
+    }
+}
+
+#[test]
 fn missing_keys_and_sections_are_added() {
     let [mass, inertia] = [one("a.mass", 2.0, 0.1), one("a.b.xy", 3.0, 0.0)];
     for (text, expected) in [

@@ -8,6 +8,7 @@
 //! | collisions between legs | [`leg_crossing`] |
 //! | other poses with the same leg lengths | [`assembly_modes`], [`other_pose_search`] |
 //! | parameters of a machine from recorded motions | [`identification`], [`drive_delay`] |
+//! | joints and zeros of the lengths from poses that a tracker has measured | [`calibration`] |
 //! | how fast the platform leaves a pose under constant forces | [`held_forces`] |
 //! | motion that shows the parameters | [`excitation_design`] |
 //! | margins of a sampled loop | [`sampled_loop`] |
@@ -21,6 +22,7 @@
 pub mod assembly_modes;
 pub mod assembly_proof;
 pub mod batch;
+pub mod calibration;
 pub mod clearance;
 pub mod drive_capability;
 pub mod drive_delay;

@@ -11,6 +11,9 @@ const QUOTIENTS: [(&str, &str); 3] = [("/", "_"), ("^", ""), ("²", "2")];
 /// Other words for columns, only to show a header: angles of other names may be of another order of rotations.
 const WORDS: [(&str, &str); 4] = [("t", "time"), ("alpha", "roll"), ("beta", "pitch"), ("gamma", "yaw")];
 
+/// What names of columns with coordinates of reflectors begin with: `point_1_x`. Their cells are empty where one was not seen.
+const POINT: &str = "point";
+
 /// Column of a file that is one of those to be read.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
@@ -22,6 +25,13 @@ pub(super) struct Column {
     pub quantity: String,
     /// Factor from its unit to SI.
     pub factor: f64,
+}
+
+impl Column {
+    /// Whether cells may be empty, which is read as NaN.
+    pub fn may_be_empty(&self) -> bool {
+        self.quantity.split('_').next() == Some(POINT)
+    }
 }
 
 /// Every column of the header that is the one of this name, in whatever unit.
@@ -104,7 +114,7 @@ fn units(name: &str) -> Vec<(String, f64)> {
     let stem = name.split('_').next().unwrap_or_default();
     let base = match (stem, AXES.iter().position(|axis| *axis == stem)) {
         ("t", _) => TIMES,
-        ("length", _) | (_, Some(3..)) => LENGTHS,
+        ("length" | POINT, _) | (_, Some(3..)) => LENGTHS,
         (_, Some(_)) => ANGLES,
         _ => &[],
     };

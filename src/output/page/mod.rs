@@ -31,6 +31,8 @@ pub enum PageKind {
     Live,
     /// An identification.
     Identification,
+    /// A calibration.
+    Calibration,
 }
 
 impl PageKind {
@@ -42,6 +44,7 @@ impl PageKind {
         match self {
             Self::Recording | Self::Live => include_str!("run.html"),
             Self::Identification => include_str!("identification.html"),
+            Self::Calibration => include_str!("calibration.html"),
         }
     }
 
@@ -60,6 +63,7 @@ impl PageKind {
                 include_str!("run.js"),
             ],
             Self::Identification => &[LIBRARY, DATA, AXIS, CHARTS, PAGE, include_str!("identification.js")],
+            Self::Calibration => &[LIBRARY, DATA, AXIS, CHARTS, PAGE, include_str!("calibration.js")],
         }
     }
 }
@@ -132,7 +136,7 @@ mod tests {
     #[test]
     fn a_page_is_one_document_that_no_text_can_leave() {
         let head = "{\"text\":\"</script><script>alert(1)\"}";
-        for kind in [PageKind::Recording, PageKind::Live, PageKind::Identification] {
+        for kind in [PageKind::Recording, PageKind::Live, PageKind::Identification, PageKind::Calibration] {
             let text = page(kind, "a < b & c", "1 < 2 & 3", head, b"foo");
             assert!(text.contains("<pre id=\"summary\">1 &lt; 2 &amp; 3</pre>"));
             assert!(text.contains("<title>a &lt; b &amp; c</title>") && text.contains(">Zm9v</script>"));

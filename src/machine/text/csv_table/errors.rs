@@ -218,8 +218,12 @@ impl TableErrors {
             return None;
         }
         let mut row = Vec::with_capacity(columns.len());
-        for &Column { index: column, ref name, factor, .. } in columns {
+        for found @ &Column { index: column, ref name, factor, .. } in columns {
             let text = cell(record.get(column).unwrap_or_default());
+            if found.may_be_empty() && text.trim().is_empty() {
+                row.push(f64::NAN);
+                continue;
+            }
             let mistake = match number(text.trim(), is_comma_decimal).map(|value| value * factor) {
                 Some(value) if value.abs() <= MAX_MAGNITUDE => {
                     row.push(value);
