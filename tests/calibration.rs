@@ -31,7 +31,7 @@ const JOINTS_M: f64 = 1e-3;
 const OFFSETS_M: f64 = 0.5e-3;
 
 fn vector(random: &mut Random, size: f64) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| size * random.gaussian())
+    Vector3::from_fn(|_, _| size * random.near_gaussian())
 }
 
 fn pose(random: &mut Random, turn: f64, shift: f64) -> Pose {
@@ -67,7 +67,7 @@ impl World {
         let (drawn, mut random) = (machine(name), Random::new(seed));
         let nominal = Geometry::of(&drawn);
         let mut displaced = |joints: Matrix3x6<f64>| {
-            let moved = joints + Matrix3x6::from_fn(|_, _| JOINTS_M * random.gaussian());
+            let moved = joints + Matrix3x6::from_fn(|_, _| JOINTS_M * random.near_gaussian());
             let pairs: Vec<_> =
                 (0..LEGS).map(|leg| (moved.column(leg).into(), joints.column(leg).into())).collect();
             let onto = fitted(&pairs).unwrap();
@@ -76,8 +76,8 @@ impl World {
             on_drawing
         };
         let (base, platform) = (displaced(nominal.base), displaced(nominal.platform));
-        let offset = Vector6::from_fn(|_, _| OFFSETS_M * random.gaussian());
-        let size = drawn.joints.radius;
+        let offset = Vector6::from_fn(|_, _| OFFSETS_M * random.near_gaussian());
+        let size = drawn.joints.radius_m;
         let (tracker, probe) = (pose(&mut random, 1.0, 2.0), pose(&mut random, 1.0, 0.3 * size));
         // As far apart as the joints.
         let reflectors = (0..3)
@@ -88,7 +88,8 @@ impl World {
 
     fn row(&mut self, at: &Pose, has_reflectors: bool) -> Row {
         let random = &mut self.random;
-        let lengths = self.truth.lengths(at).0 + Vector6::from_fn(|_, _| NOISE.length_m * random.gaussian());
+        let lengths =
+            self.truth.lengths(at).0 + Vector6::from_fn(|_, _| NOISE.length_m * random.near_gaussian());
         let in_tracker = joined(&self.tracker, at);
         let seen = if has_reflectors {
             let seen = self.reflectors.iter().map(|place| {
@@ -119,7 +120,7 @@ impl World {
         let error = |pose: &Pose| {
             let mut tracker = Tracker::new(&machine, *pose);
             tracker.find(&machine, &(self.truth.lengths(pose).0 + geometry.offset).into());
-            machine.joints.distance(tracker.pose(), pose) * machine.joints.radius
+            machine.joints.distance(tracker.pose(), pose) * machine.joints.radius_m
         };
         poses.iter().map(error).fold(0.0, f64::max)
     }
@@ -322,7 +323,7 @@ fn mistakes_of_a_table_are_named() {
 fn reflectors_may_be_missing() {
     let mut world = World::new("gimbal", 5);
     let (planned, workspace) = (planned(&world.drawn, 60), poses(&world.drawn, 50, [0.0, 0.95], 6));
-    world.reflectors.push(Vector3::new(0.1, 0.2, 0.3) * world.drawn.joints.radius);
+    world.reflectors.push(Vector3::new(0.1, 0.2, 0.3) * world.drawn.joints.radius_m);
     let mut rows = world.rows(&planned, true);
     for (k, row) in rows.iter_mut().enumerate() {
         if let Seen::Reflectors(seen) = &mut row.seen {

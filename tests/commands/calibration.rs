@@ -18,7 +18,8 @@ const PROBE: [f64; 6] = [-0.2, 0.5, 0.1, 0.02, 0.05, 0.1];
 /// Joints half a millimetre off the drawing.
 fn truth(folder: &Folder) -> Geometry {
     let (nominal, mut random) = (Geometry::of(&folder.config().machine), Random::new(3));
-    let mut moved = |joints: Matrix3x6<f64>| joints + Matrix3x6::from_fn(|_, _| 5e-4 * random.gaussian());
+    let mut moved =
+        |joints: Matrix3x6<f64>| joints + Matrix3x6::from_fn(|_, _| 5e-4 * random.near_gaussian());
     let [base, platform] = [nominal.base, nominal.platform].map(&mut moved);
     Geometry { base, platform, offset: Vector6::from(OFFSET_M) }
 }
@@ -40,7 +41,7 @@ fn table(folder: &Folder, poses: &[Pose], lengths: [usize; 6]) -> String {
     let mut text = format!("row,{},x_mm,y_mm,z_mm,alpha,beta,gamma\n", names.join(","));
     for (k, pose) in poses.iter().enumerate() {
         let seen = joined(&joined(&pose_of(&TRACKER), pose), &pose_of(&PROBE));
-        let mut noise = |size: f64| Vector3::from_fn(|_, _| size * random.gaussian());
+        let mut noise = |size: f64| Vector3::from_fn(|_, _| size * random.near_gaussian());
         let seen =
             Pose { rotation: exp(&noise(2e-5)) * seen.rotation, position: seen.position + noise(2e-5) };
         let [alpha, beta, gamma, x, y, z] = task_coordinates(&seen, &[0.0; 6]);

@@ -88,7 +88,7 @@ fn a_platform_with_other_joints_is_calibrated_as_the_guide_says() {
     let mut text = "x,y,z,qw,qx,qy,qz\n".to_owned();
     for lengths in visited(&machine, "VISITED.csv") {
         let seen = joined(&joined(&pose_of(&TRACKER), &pose_with(&truth, lengths)), &pose_of(&PROBE));
-        let mut noise = || Vector3::from_fn(|_, _| 2e-5 * random.gaussian());
+        let mut noise = || Vector3::from_fn(|_, _| 2e-5 * random.near_gaussian());
         let (place, rotation) = (seen.position + noise(), exp(&noise()) * seen.rotation);
         let [w, i, j, k] = hexad::motion::rotation_order::quaternion_of(&rotation, &[1.0, 0.0, 0.0, 0.0]);
         text += &format!("{:?},{:?},{:?},{w:?},{i:?},{j:?},{k:?}\n", place.x, place.y, place.z);

@@ -35,7 +35,7 @@ pub enum Mistake {
 
 /// Frames that suit the drawn machine best, and the median residual with them \[m\].
 pub fn drawn_fit(machine: &Machine, rows: &[Row]) -> Option<(Unknowns, f64)> {
-    let (nominal, radius) = (Geometry::of(machine), machine.joints.radius);
+    let (nominal, radius) = (Geometry::of(machine), machine.joints.radius_m);
     let noise = Noise { length_m: radius, position_m: radius, angle_rad: 1.0 }.scaled(COARSE_RATIO);
     let tolerance_m = FIXED_RATIO * radius;
     let problem = Problem { rows, nominal: &nominal, tolerance_m, noise, precision: COARSE_PRECISION };

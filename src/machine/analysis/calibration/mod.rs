@@ -208,7 +208,7 @@ impl Task<'_> {
 
     /// Another start: joints, frames and poses displaced.
     fn second_start(&self, drawn: &Unknowns) -> Unknowns {
-        let (mut random, radius) = (Random::new(1), self.machine.joints.radius);
+        let (mut random, radius) = (Random::new(1), self.machine.joints.radius_m);
         let mut step = |k: usize| {
             let size = match k {
                 _ if k < GEOMETRY_VALUES => SECOND_START_RATIO * self.tolerance_m,

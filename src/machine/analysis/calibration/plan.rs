@@ -31,14 +31,15 @@ pub fn spread_poses(
     is_allowed: impl Fn(&Pose) -> bool,
 ) -> Vec<Pose> {
     let (mut random, home) = (Random::new(seed), Vector6::from(machine.home));
-    let scale = [machine.max_rotation, machine.actuator.stroke()];
+    let scale = [machine.max_rotation_rad, machine.actuator.stroke()];
     let is_within = |x: &Vector6<f64>| {
         let pose = pose_of(&(*x).into());
         let turn = machine.home_pose().displacement_to(&pose).angular.norm();
-        turn <= machine.max_rotation && is_allowed(&pose)
+        turn <= machine.max_rotation_rad && is_allowed(&pose)
     };
     let draw = |_| {
-        let way = Vector6::from_fn(|axis, _| random.gaussian() * if axis < 3 { scale[0] } else { scale[1] });
+        let way =
+            Vector6::from_fn(|axis, _| random.near_gaussian() * if axis < 3 { scale[0] } else { scale[1] });
         let (mut inside, mut outside) = (0.0, LARGEST_SHARE);
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (inside + outside);
