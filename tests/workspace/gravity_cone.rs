@@ -152,29 +152,44 @@ fn check(text: &str, more: &[&str]) -> (Option<i32>, serde_json::Value, String) 
 
 #[test]
 fn check_examines_the_cone_and_names_leg_direction_and_pose() {
-    let text = fs::read_to_string(data("motion_base", "toml")).unwrap();
-    let (code, report, _) = check(&text, &["--gravity-cone", "40deg"]);
-    assert_eq!(code, Some(0));
-    let (machine, home) = (machine("motion_base"), &report["gravity_cone"]["at_home"]);
-    let expected = GravityCone::new(machine.gravity_m_s2, 40_f64.to_radians());
+    let (text, half_angle) = (fs::read_to_string(data("motion_base", "toml")).unwrap(), 40_f64.to_radians());
+    let machine = machine("motion_base");
+    let expected = GravityCone::new(machine.gravity_m_s2, half_angle);
     let expected = expected.worst_holding(&machine, [machine.home]).unwrap();
-    assert_eq!(home["force_n"], expected.force_n);
-    assert_eq!(home["leg"], expected.leg);
-    assert!(report["gravity_cone"]["hardest"].is_null(), "no [envelope]");
+    let examine = |text: &str, half_angle: Option<f64>| {
+        Config::parse(text, "M.toml").unwrap().examine_in_cone(half_angle)
+    };
     // Drives that hold the platform upright and not tipped.
     let force = format!("max_force_n = {}", (expected.force_n / MAX_HOLDING_SHARE).floor() - 1.0);
     let weak = text.replace("max_force_n = 20000.0", &force);
-    assert_eq!(check(&weak, &[]).0, Some(0));
+    let upright = examine(&weak, None);
+    assert!(upright.errors.is_empty() && upright.gravity_cone.is_none(), "{upright:?}");
     let (code, report, errors) = check(&weak, &["--gravity-cone", "40deg"]);
     assert_eq!((code, &report["is_valid"]), (Some(2), &false.into()));
     assert!(errors.contains("N at home with gravity up to 40.0 deg from gravity_m_s2, 90 %"), "{errors}");
+    let cone = &report["gravity_cone"];
+    assert_eq!(
+        (&cone["at_home"]["force_n"], &cone["hardest"]),
+        (&expected.force_n.into(), &serde_json::Value::Null)
+    );
+    assert_eq!(cone["at_home"]["leg"], expected.leg);
     // The same in an envelope: a pose of it, and a direction.
-    let low = "[envelope]\npose_min = [0.0, 0.0, 0.0, -0.1, -0.1, -0.1]\npose_max = [0.0, 0.0, 0.0, 0.1, 0.1, 0.1]\n\
-        velocity = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]\nacceleration = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]\n";
-    let (code, report, errors) = check(&format!("{text}\n{low}"), &["--gravity-cone", "40deg"]);
-    let hardest = &report["gravity_cone"]["hardest"];
-    assert_eq!(code, Some(0), "{errors}");
-    assert!(hardest["force_n"].as_f64().unwrap() > expected.force_n, "{hardest}");
+    let numbers = |number: f64| format!("[0.0, 0.0, 0.0, {number}, {number}, {number}]");
+    let envelope = |size: f64| {
+        let (low, high, rate) = (numbers(-size), numbers(size), [0.1; 6]);
+        format!(
+            "[envelope]\npose_min = {low}\npose_max = {high}\nvelocity = {rate:?}\nacceleration = {rate:?}\n"
+        )
+    };
+    let found = examine(&format!("{text}\n{}", envelope(0.1)), Some(half_angle));
+    let hardest = found.gravity_cone.unwrap().hardest.unwrap();
+    assert!(found.errors.is_empty() && hardest.force_n > expected.force_n, "{hardest:?}");
+    // Held at home in every direction, and not in the envelope.
+    let force = format!("max_force_n = {}", (expected.force_n / MAX_HOLDING_SHARE).ceil() + 1.0);
+    let weak = text.replace("max_force_n = 20000.0", &force);
+    let found = examine(&format!("{weak}\n{}", envelope(0.1)), Some(half_angle));
+    let bound = &found.errors.first().unwrap().bound;
+    assert!(bound.contains("N within [envelope] at x") && bound.contains("up to 40.0 deg from"), "{bound}");
     let (code, _, errors) = check(&text, &["--gravity-cone", "40"]);
     assert!(code == Some(2) && errors.contains("has no unit: say 40deg or 40rad"), "{errors}");
 }
