@@ -9,6 +9,7 @@ mod frames;
 mod invariance;
 mod kinematics;
 mod layouts;
+mod moving_base;
 mod regressor;
 mod rotations;
 mod stances;

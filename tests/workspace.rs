@@ -4,6 +4,7 @@
 
 mod command;
 mod forces;
+mod gravity_cone;
 mod other_poses;
 mod regions;
 

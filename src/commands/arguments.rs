@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use super::quantity::angle_within;
 use crate::commands::orientation::{OrientationFormat, ROTATION_HELP};
 use hexad_client::operator::protocol::RequestLine;
 use hexad_core::motion::built_in::BuiltInMotion;
@@ -15,6 +16,14 @@ use hexad_machine::text::csv_table::GROUPS;
 /// Help text of `--group`.
 pub const GROUP_HELP: &str =
     "Group of columns to read from a table of hexad convert; else setpoint, or the only one";
+
+/// Help text of `--gravity-cone`.
+pub const CONE_HELP: &str = "Gravity in any direction up to this angle from the file's, with its unit: a base that tips or is mounted otherwise";
+
+/// Half angle of a cone of directions \[rad\].
+pub fn cone(text: &str) -> Result<f64, String> {
+    angle_within(text, ["0deg", "180deg"])
+}
 
 /// Configuration of demonstrations and diagnoses without `--config`.
 pub const DEFAULT_CONFIG: &str = include_str!("../../config/fried2008.toml");

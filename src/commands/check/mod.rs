@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 pub use self::report::CheckReport;
-use crate::commands::arguments::MachineFile;
+use crate::commands::arguments::{CONE_HELP, MachineFile, cone};
 use crate::commands::failure::Failure;
 use hexad_machine::text::files::{print, print_json};
 
@@ -20,6 +20,8 @@ pub struct CheckArguments {
     /// Draw the machine at home (SVG): from above, from the side, in perspective, with numbered joints
     #[arg(long, value_name = "FILE")]
     drawing: Option<PathBuf>,
+    #[arg(long, help = CONE_HELP, value_name = "ANGLE", value_parser = cone, allow_hyphen_values = true)]
+    gravity_cone: Option<f64>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -28,7 +30,7 @@ pub struct CheckArguments {
 impl CheckArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let config = self.machine.load()?;
-        let examination = config.examine();
+        let examination = config.examine_in_cone(self.gravity_cone);
         let report = CheckReport::new(&config, &examination);
         // The numbers first: they are useful even if no file can be written.
         if self.json {

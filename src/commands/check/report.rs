@@ -12,6 +12,7 @@ use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::assembly_modes::other_modes;
 use hexad_machine::analysis::clearance::Clearance;
+use hexad_machine::analysis::gravity_cone::ConeHolding;
 use hexad_machine::analysis::other_pose_search::OtherPoseSearch;
 use hexad_machine::config::control_loops::{ControlLoop, longest_stable_age_s, loops};
 use hexad_machine::config::deployment::default_limits::{DerivedLimit, derived_limits};
@@ -76,6 +77,8 @@ pub struct CheckReport {
     pub loops: Vec<LoopMargins>,
     /// Largest age of measurements with which the loops are stable.
     pub stable_age_s: f64,
+    /// Forces under gravity in any direction of `--gravity-cone`.
+    pub gravity_cone: Option<ConeHolding>,
     /// Largest pole of the platform under constant forces within `condition_limit`.
     pub held_pole_per_s: f64,
 }
@@ -168,6 +171,7 @@ impl CheckReport {
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_stable_age_s(deployment),
+            gravity_cone: examination.gravity_cone,
             held_pole_per_s: limits.held_pole_per_s,
         }
     }

@@ -32,6 +32,9 @@ impl fmt::Display for CheckReport {
                 significant(self.available_force_n)
             )?;
         }
+        if let Some(cone) = &self.gravity_cone {
+            writeln!(f, "{cone}")?;
+        }
         self.fmt_modes(f)?;
         writeln!(f, "other permitted poses             {}", self.other_pose_search)?;
         self.fmt_loops(f)?;

@@ -10,7 +10,7 @@ use clap::Args;
 use self::map::MapDrawing;
 use self::report::{BoxRange, SCHEMA, SliceReport, WorkspaceReport, region_reports};
 use self::slice::{Plane, Slice};
-use super::arguments::{MachineFile, number_within};
+use super::arguments::{CONE_HELP, MachineFile, cone, number_within};
 use super::failure::{CommandError, Failure};
 use super::progress::item_bar;
 use super::quantity::{angle, angle_within, length, list};
@@ -71,6 +71,8 @@ pub struct WorkspaceQuery {
     /// Turn about any axis that the second ball allows, with its unit
     #[arg(long, value_name = "ANGLE", default_value = "10deg", value_parser = turn, allow_hyphen_values = true)]
     turn: f64,
+    #[arg(long, help = CONE_HELP, value_name = "ANGLE", value_parser = cone, allow_hyphen_values = true)]
+    gravity_cone: Option<f64>,
     /// Folder for the maps and their tables
     #[arg(long, value_name = "FOLDER", default_value = "hexad-workspace")]
     output: PathBuf,
@@ -131,7 +133,8 @@ impl WorkspaceReport {
         let reachable = machine.with_stroke_margin(deployment.limits.stroke_margin_m);
         let home = KinematicState::new(machine, machine.home_pose());
         let largest_condition = max_reference_condition(&home, deployment.limits.condition);
-        let clearance = Clearance::new(&reachable, largest_condition);
+        let clearance =
+            Clearance::new(&reachable, largest_condition).in_cone(query.gravity_cone.unwrap_or(0.0));
         let through = query.through.unwrap_or(machine.home);
         if let Some(obstacle) = clearance.violation_at(&TaskState::at_rest(through).motion().pose) {
             let obstacle = ObstacleText { obstacle, largest_condition };
@@ -148,6 +151,8 @@ impl WorkspaceReport {
         let regions = regions(&reachable, &clearance, query.turn, &shape);
         let [ball, ..] = &regions;
         let drawing = MapDrawing { name, machine, largest_condition, ball: ball.guaranteed };
+        let gravity_cone =
+            query.gravity_cone.map(|angle| report::cone_holding(machine, &clearance, angle, &slices));
         let files = write(&drawing, &slices, &query.output)?;
         let slices = slices.iter().map(|slice| SliceReport::new(slice, &clearance)).collect();
         let report = Self {
@@ -157,6 +162,7 @@ impl WorkspaceReport {
             angular_acceleration_rad_s2: effort.angular_rad_s2,
             condition_limit: largest_condition,
             max_force_n: machine.actuator.weakest_available_force_n(),
+            gravity_cone,
             slices,
             regions: region_reports(regions, query.turn.to_degrees(), envelope.is_some(), largest_condition),
             largest_box: BoxRange::all(&shape, regions[2].guaranteed),
@@ -175,7 +181,7 @@ fn slices(
     query: &WorkspaceQuery,
     through: [f64; 6],
 ) -> Vec<Slice> {
-    let workspace = PoseEvaluator::new(machine, effort);
+    let workspace = PoseEvaluator::new(machine, effort).in_cone(query.gravity_cone.unwrap_or(0.0));
     let default = Plane::default_three(&machine.gravity_m_s2);
     let planes = if query.planes.is_empty() { &default[..] } else { &query.planes };
     let bar = item_bar(planes.len() * query.resolution * query.resolution, "poses");

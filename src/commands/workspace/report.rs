@@ -8,12 +8,14 @@ use serde::Serialize;
 use super::ObstacleText;
 use super::slice::Slice;
 use hexad_core::control::constants::MAX_HOLDING_SHARE;
+use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::sensitivity::CONDITION_MEANING;
 use hexad_core::model::task::TaskState;
 use hexad_machine::analysis::clearance::Clearance;
 use hexad_machine::analysis::drive_capability::DriveCapability;
 use hexad_machine::analysis::envelope::EnvelopeBounds;
+use hexad_machine::analysis::gravity_cone::{ConeHolding, GravityCone};
 use hexad_machine::analysis::other_pose_search::OtherPoseSearch;
 use hexad_machine::analysis::pose_quality::PoseQuality;
 use hexad_machine::analysis::region_search::RegionBounds;
@@ -37,6 +39,8 @@ pub struct WorkspaceReport {
     pub condition_limit: f64,
     /// Force that every leg can get: `actuator.max_force_n`, less what scale and load friction take.
     pub max_force_n: f64,
+    /// Forces under gravity in any direction of `--gravity-cone`: at home, and over the usable poses of the slices.
+    pub gravity_cone: Option<ConeHolding>,
     pub slices: Vec<SliceReport>,
     /// The ball at home's orientation, the ball with any turn, and the box.
     pub regions: Vec<RegionReport>,
@@ -90,10 +94,7 @@ pub struct BoxRange {
 impl SliceReport {
     pub fn new(slice: &Slice, clearance: &Clearance) -> Self {
         let in_reach = slice.poses().filter(|(_, quality)| quality.within_reach());
-        let is_usable =
-            |(x, _): &([f64; 6], _)| clearance.violation_at(&TaskState::at_rest(*x).motion().pose).is_none();
-        let usable: Vec<&PoseQuality> =
-            in_reach.clone().filter(is_usable).map(|(_, quality)| quality).collect();
+        let usable: Vec<&PoseQuality> = usable(slice, clearance).map(|(_, quality)| quality).collect();
         let ends = |value: fn(&PoseQuality) -> f64| {
             let values = usable.iter().copied().map(value);
             values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(high, v)])
@@ -127,6 +128,28 @@ impl SliceReport {
             range(self.payload_kg),
         ]
     }
+}
+
+/// Poses of a slice that the reference goes to.
+fn usable<'a>(
+    slice: &'a Slice,
+    clearance: &'a Clearance<'a>,
+) -> impl Iterator<Item = ([f64; 6], &'a PoseQuality)> {
+    let in_reach = slice.poses().filter(|(_, quality)| quality.within_reach());
+    in_reach.filter(|(x, _)| clearance.violation_at(&TaskState::at_rest(*x).motion().pose).is_none())
+}
+
+/// Forces under gravity in any direction of a cone, at home and over the usable poses of the slices.
+pub fn cone_holding(
+    machine: &Machine,
+    clearance: &Clearance,
+    half_angle_rad: f64,
+    slices: &[Slice],
+) -> ConeHolding {
+    let cone = GravityCone::new(machine.gravity_m_s2, half_angle_rad);
+    let poses = slices.iter().flat_map(|slice| usable(slice, clearance)).map(|(x, _)| x);
+    let at_home = cone.worst_holding(machine, [machine.home]);
+    ConeHolding { half_angle_rad, at_home, hardest: cone.worst_holding(machine, poses) }
 }
 
 /// Reports of both balls and the box.
@@ -182,7 +205,9 @@ impl WorkspaceReport {
         if !self.slices.iter().any(has_none) {
             return None;
         }
-        let drives = DriveCapability::new(machine, &machine.home_pose())?;
+        let cone_rad = self.gravity_cone.map_or(0.0, |cone| cone.half_angle_rad);
+        let cone = GravityCone::new(machine.gravity_m_s2, cone_rad);
+        let drives = DriveCapability::in_cone(&InverseDynamics::new(machine), &machine.home_pose(), &cone)?;
         let (linear, angular) = (self.acceleration_m_s2, self.angular_acceleration_rad_s2);
         let forces = drives.largest_forces(linear, angular);
         let [holding, of_linear, of_angular] = forces.map(|force| 100.0 * force / self.max_force_n);
@@ -209,6 +234,9 @@ impl fmt::Display for WorkspaceReport {
             "{}: forces from rest under {linear} m/s2 and {angular} rad/s2, each in any direction\n",
             self.machine
         )?;
+        if let Some(cone) = &self.gravity_cone {
+            writeln!(f, "{cone}\n")?;
+        }
         let [name, numbers @ ..] = [
             "slice",
             "poses",

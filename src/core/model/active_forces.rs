@@ -13,7 +13,7 @@
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::LEGS;
 use super::factorization::{Factorization, LaneWrench, wrench_columns};
@@ -98,7 +98,17 @@ impl InverseDynamics {
 
     /// Actuator forces Gamma \[N\] for a motion of the platform; `None` at a singular pose.
     pub fn forces<M: ModelTerms>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion))?;
+        self.forces_under::<M>(motion, &self.machine.gravity_m_s2)
+    }
+
+    /// Actuator forces as by [`InverseDynamics::forces`] with another gravity, in base axes: of a base that stands otherwise, or, less its
+    /// acceleration, of one that moves along a line.
+    pub fn forces_under<M: ModelTerms>(
+        &self,
+        motion: &Motion,
+        gravity_m_s2: &Vector3<f64>,
+    ) -> Option<[f64; LEGS]> {
+        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion, gravity_m_s2))?;
         Some(self.joints.triples.unpack(&lane))
     }
 
@@ -110,19 +120,29 @@ impl InverseDynamics {
     /// Actuator forces in lanes. Code for the generic instruction set sorts them, one load after another.
     /// With AVX-512 the compiler would use a gather, which waits until its operands are in the cache.
     #[inline(always)]
-    fn balanced<S: Simd, M: ModelTerms>(&self, simd: S, motion: &Motion) -> Option<LegLanes> {
+    fn balanced<S: Simd, M: ModelTerms>(
+        &self,
+        simd: S,
+        motion: &Motion,
+        gravity: &Vector3<f64>,
+    ) -> Option<LegLanes> {
         let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
         let factorization = Factorization::new(simd, &self.joints, &legs);
-        let (wrench, axial) = self.load::<_, M>(simd, motion, &legs);
+        let (wrench, axial) = self.load::<_, M>(simd, motion, gravity, &legs);
         factorization.forces(&legs, &wrench, axial)
     }
 
     /// Load of a motion, before solving for the six forces.
     pub fn load_of<M: ModelTerms>(&self, motion: &Motion) -> TaskLoad {
+        self.load_under::<M>(motion, &self.machine.gravity_m_s2)
+    }
+
+    /// Load as by [`InverseDynamics::load_of`] with another gravity, in base axes.
+    pub fn load_under<M: ModelTerms>(&self, motion: &Motion, gravity_m_s2: &Vector3<f64>) -> TaskLoad {
         dispatch!(self.machine.level, simd => {
             let triples = &self.joints.triples;
             let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
-            let (wrench, axial) = self.load::<_, M>(simd, motion, &legs);
+            let (wrench, axial) = self.load::<_, M>(simd, motion, gravity_m_s2, &legs);
             TaskLoad {
                 leg_wrenches: wrench_columns(triples, &legs),
                 wrench: wrench.sum().vector(),
@@ -138,6 +158,7 @@ impl InverseDynamics {
         &self,
         simd: S,
         motion: &Motion,
+        gravity: &Vector3<f64>,
         legs: &LegGeometry<S>,
     ) -> (LaneWrench<S>, f64x8<S>) {
         let velocity = legs.velocity(simd, &motion.twist);
@@ -147,8 +168,8 @@ impl InverseDynamics {
         let map = acceleration_map(&twist, &acceleration);
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
         let universal_axis = Lanes3::load(simd, &self.machine.joints.universal_axis);
-        let reaction =
-            ForceOnLeg::new::<M>(simd, &self.legs, universal_axis, legs, &velocity, joint_acceleration);
+        let accelerations = [joint_acceleration, Lanes3::splat(simd, gravity)];
+        let reaction = ForceOnLeg::new::<M>(simd, &self.legs, universal_axis, legs, &velocity, accelerations);
         let mut wrench = LaneWrench {
             torque: legs.arm.cross(reaction.transverse).folded(),
             force: reaction.transverse.folded(),

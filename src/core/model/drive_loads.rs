@@ -61,7 +61,8 @@ impl DriveLoads {
     ) -> Option<Self> {
         let of_legs = f64x8::load_array(simd, [1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0]);
         let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
-        let (wrench, axial) = dynamics.load::<_, Gravity>(simd, &rest, legs);
+        let gravity = &dynamics.machine().gravity_m_s2;
+        let (wrench, axial) = dynamics.load::<_, Gravity>(simd, &rest, gravity, legs);
         let holding = factorization.forces(legs, &wrench, axial)?.load(simd) * of_legs;
         let [x, y, z] = dynamics.joint_masses(simd, legs);
         let [mx, my, mz] = [&x, &y, &z].map(|column| column.transverse);
@@ -84,6 +85,26 @@ impl DriveLoads {
             *column = (factorization.forces(legs, &wrench, axial)?.load(simd) * of_legs).into();
         }
         Some(Self { holding: holding.into(), by_acceleration })
+    }
+
+    /// Forces at rest per unit of gravity along each base axis, leg after leg \[kg\]: `Gamma_g = [row . g]`; `None` where the pose is
+    /// singular.
+    pub fn holding_rows(dynamics: &InverseDynamics, pose: &Pose) -> Option<[Vector3<f64>; LEGS]> {
+        let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
+        let [x, y, z] = dispatch!(dynamics.machine().level, simd => {
+            let joints = dynamics.joints();
+            let legs = LegGeometry::around_center(simd, joints, pose);
+            let factorization = Factorization::new(simd, joints, &legs);
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
+                let (wrench, axial) = dynamics.load::<_, Gravity>(simd, &rest, &axis, &legs);
+                factorization.forces(&legs, &wrench, axial).map(|lane| joints.triples.unpack(&lane))
+            })
+        });
+        let mut rows = [Vector3::zeros(); LEGS];
+        for (row, ((x, y), z)) in rows.iter_mut().zip(x?.into_iter().zip(y?).zip(z?)) {
+            *row = Vector3::new(x, y, z);
+        }
+        Some(rows)
     }
 
     /// Forces at rest, in the order of the legs \[N\].

@@ -31,9 +31,6 @@
 //! legs without axial inertia. The effect is 1e-5 to 1e-2 of the force. It is larger near `u || n`, where the
 //! spin is singular; `MIN_UNIVERSAL_SINE_SQUARED` keeps the arithmetic finite there.
 
-use fearless_simd::{Simd, f64x8, prelude::*};
-use nalgebra::Vector3;
-
 use super::LEGS;
 use super::fidelity::{LegInertia, ModelTerms};
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
@@ -41,6 +38,7 @@ use super::lanes::LaneArithmetic as _;
 use super::lanes3::Lanes3;
 use super::machine::Machine;
 use super::triples::{LegLanes, Triples};
+use fearless_simd::{Simd, f64x8, prelude::*};
 
 /// Smallest `|u x n|^2` used as a divisor: a leg within 1e-6 rad of the first axis of its universal joint.
 pub(super) const MIN_UNIVERSAL_SINE_SQUARED: f64 = 1e-12;
@@ -68,8 +66,6 @@ pub(super) struct LegConstants {
     lumped_mass: LegLanes,
     /// The platform's mass in the padding, 0 for legs.
     platform_mass: LegLanes,
-    /// Gravity, base axes \[m/s^2\].
-    gravity: Vector3<f64>,
 }
 
 impl LegConstants {
@@ -101,7 +97,6 @@ impl LegConstants {
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
-            gravity: machine.gravity_m_s2,
         }
     }
 
@@ -117,7 +112,6 @@ impl LegConstants {
             legs_only: leg(&self.legs_only),
             lumped_mass: leg(&self.lumped_mass),
             platform_mass: leg(&self.platform_mass),
-            gravity: self.gravity,
         }
     }
 }
@@ -139,7 +133,7 @@ pub(super) struct ForceOnLeg<S: Simd> {
 }
 
 impl<S: Simd> ForceOnLeg<S> {
-    /// Evaluates the force; `joint_acceleration` is aB.
+    /// Evaluates the force; `[joint_acceleration, gravity]` are aB and g.
     #[inline(always)]
     pub fn new<M: ModelTerms>(
         simd: S,
@@ -147,10 +141,9 @@ impl<S: Simd> ForceOnLeg<S> {
         universal_axis: Lanes3<f64x8<S>>,
         legs: &LegGeometry<S>,
         velocity: &LegVelocity<S>,
-        joint_acceleration: Lanes3<f64x8<S>>,
+        [joint_acceleration, gravity]: [Lanes3<f64x8<S>>; 2],
     ) -> Self {
         let load = |lanes: &LegLanes| lanes.load(simd);
-        let gravity = Lanes3::splat(simd, &constants.gravity);
         if M::LEGS != LegInertia::Links {
             // Points at B, including the platform's point: no projection.
             let mass =

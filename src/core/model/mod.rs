@@ -15,7 +15,7 @@
 //! | (10)-(12), (34)-(36), (46)-(52), (54) | no file: their print is not at hand. Rates and accelerations of the joints, which |
 //! | | their neighbours need: `tests/support/paper/kinematics.rs` |
 //! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], |
-//! | | [`drive_loads`], [`transmission`], [`triples`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu`, |
+//! | | [`drive_loads`], [`transmission`], [`triples`], [`moving_base`], `conditioning`, `factorization`, `force_changes`, `fused`, `lanes`, `lanes3`, `lu`, |
 //! | | `pose_factorization`, `pose_lanes` |
 //!
 //! # Errata of the print
@@ -56,6 +56,7 @@ pub mod leg;
 mod lu;
 pub mod machine;
 pub mod mass_matrix;
+pub mod moving_base;
 pub mod platform;
 mod pose_factorization;
 mod pose_lanes;

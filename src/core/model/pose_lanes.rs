@@ -66,10 +66,26 @@ impl InverseDynamics {
         motions: &[Motion],
         forces_n: &mut [Option<[f64; LEGS]>],
     ) {
-        with_terms!(fidelity, M => self.write_forces::<M>(motions, forces_n));
+        self.forces_of_all_under(fidelity, motions, &self.machine().gravity_m_s2, forces_n);
     }
 
-    fn write_forces<M: ModelTerms>(&self, motions: &[Motion], forces: &mut [Option<[f64; LEGS]>]) {
+    /// Actuator forces as by [`InverseDynamics::forces_of_all`] with another gravity, in base axes.
+    pub fn forces_of_all_under(
+        &self,
+        fidelity: Fidelity,
+        motions: &[Motion],
+        gravity_m_s2: &Vector3<f64>,
+        forces_n: &mut [Option<[f64; LEGS]>],
+    ) {
+        with_terms!(fidelity, M => self.write_forces::<M>(motions, gravity_m_s2, forces_n));
+    }
+
+    fn write_forces<M: ModelTerms>(
+        &self,
+        motions: &[Motion],
+        gravity: &Vector3<f64>,
+        forces: &mut [Option<[f64; LEGS]>],
+    ) {
         let constants = self.leg_constants().of_one_leg();
         let joints = self.joints_in_lane_order();
         dispatch!(self.machine().level, simd => {
@@ -84,14 +100,14 @@ impl InverseDynamics {
                     &padded
                 };
                 let ([a, b, c, d, e, f], [d_a, d_s]) =
-                    self.forces_in_lanes::<_, M>(simd, &constants, &joints, eight, &mut columns);
+                    self.forces_in_lanes::<_, M>(simd, &constants, &joints, (eight, gravity), &mut columns);
                 let lanes = a.into_iter().zip(b).zip(c).zip(d.into_iter().zip(e).zip(f));
                 let lanes = lanes.zip(d_a.into_iter().zip(d_s));
                 for ((force, motion), ((((a, b), c), ((d, e), f)), (d_a, d_s))) in forces.iter_mut().zip(motions).zip(lanes) {
                     *force = if are_regular_blocks(d_a, d_s, self.joints().radius_cubed_m3) {
                         Some(self.joints().triples.unpack(&LegLanes([a, b, c, 0.0, d, e, f, 0.0])))
                     } else {
-                        self.forces::<M>(motion)
+                        self.forces_under::<M>(motion, gravity)
                     };
                 }
             }
@@ -122,7 +138,7 @@ impl InverseDynamics {
         simd: S,
         constants: &LegConstants,
         joints: &[Joint; LEGS],
-        motions: &[Motion; LANES],
+        (motions, gravity): (&[Motion; LANES], &Vector3<f64>),
         columns: &mut [LoadedColumn<S>; LEGS],
     ) -> ([[f64; LANES]; LEGS], [[f64; LANES]; 2]) {
         let motions = Motions::load(simd, motions);
@@ -135,7 +151,7 @@ impl InverseDynamics {
 
         let platform = &self.machine().platform;
         let arm = motions.rotation.times_vector(simd, &platform.center_of_mass_m);
-        let gravity = Lanes3::splat(simd, &self.machine().gravity_m_s2);
+        let gravity = Lanes3::splat(simd, gravity);
         let mut force = (linear + map.times(arm) - gravity) * f64x8::splat(simd, platform.mass_kg);
         let mut torque = arm.cross(force);
         if M::ACCELERATION {
@@ -152,8 +168,9 @@ impl InverseDynamics {
             let velocity = leg.velocity_in_lanes(motions.angular_velocity, motions.velocity);
             let joint_acceleration = linear + map.times(arm);
             let universal_axis = Lanes3::splat(simd, &joint.universal_axis);
+            let accelerations = [joint_acceleration, gravity];
             let reaction =
-                ForceOnLeg::new::<M>(simd, constants, universal_axis, &leg, &velocity, joint_acceleration);
+                ForceOnLeg::new::<M>(simd, constants, universal_axis, &leg, &velocity, accelerations);
             if M::LEGS != LegInertia::Massless {
                 force = force + reaction.transverse;
                 torque = torque + arm.cross(reaction.transverse);

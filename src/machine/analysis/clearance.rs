@@ -34,13 +34,12 @@
 
 use nalgebra::{Matrix6, Vector3};
 
+use super::gravity_cone::GravityCone;
 use super::region_shape::{PoseCell, RegionShape, turned};
-use crate::analysis::drive_capability::DriveCapability;
 use hexad_core::control::constants::{MAX_HOLDING_SHARE, least_universal_sine};
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::conditioning::Conditioning;
-use hexad_core::model::drive_loads::DriveLoads;
 use hexad_core::model::force_changes::{ForceChangeBounds, LargestMotion};
 use hexad_core::model::inverse_geometry::{leg_lengths, universal_sine};
 use hexad_core::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
@@ -77,6 +76,7 @@ pub struct Clearance<'a> {
     home_determinant: f64,
     largest_condition: f64,
     least_universal_sine: f64,
+    gravity: GravityCone,
     dynamics: InverseDynamics,
     force_changes: ForceChangeBounds,
     /// Lengths of the arms of the joints on the platform: from C, and from their mean in radii.
@@ -99,6 +99,7 @@ impl<'a> Clearance<'a> {
             home,
             home_determinant: at_home.sensitivity().determinant,
             least_universal_sine: least_universal_sine(machine, &at_home),
+            gravity: GravityCone::new(machine.gravity_m_s2, 0.0),
             dynamics: InverseDynamics::new(machine),
             force_changes: ForceChangeBounds::new(machine),
             largest_condition,
@@ -106,6 +107,11 @@ impl<'a> Clearance<'a> {
             joints: platform,
             mean,
         }
+    }
+
+    /// The same limits under gravity in any direction within so much of the machine's.
+    pub fn in_cone(self, half_angle_rad: f64) -> Self {
+        Self { gravity: GravityCone::new(self.machine.gravity_m_s2, half_angle_rad), ..self }
     }
 
     /// The leg nearest to an end of its stroke at the middle of a cell, and its distance from that end \[m\]. C can
@@ -178,7 +184,7 @@ impl<'a> Clearance<'a> {
         if !(universal_sine(self.machine, pose) >= self.least_universal_sine) {
             return Some(WorkspaceLimit::UniversalJoint);
         }
-        let (leg, force) = DriveCapability::of(&self.dynamics, pose)?.largest_holding_force();
+        let (leg, force) = self.gravity.largest_holding_force(&self.dynamics, pose)?;
         (!(force <= self.holding_force())).then_some(WorkspaceLimit::HoldingForce(leg))
     }
 
@@ -190,9 +196,8 @@ impl<'a> Clearance<'a> {
     /// the platform. `turned_leg`, `change` and `left` are the largest q and D, and `1 - f`.
     fn is_held(&self, pose: &Pose, turn: f64, turned_leg: f64, change: f64, left: f64) -> bool {
         let middle = Conditioning::new(self.machine, pose);
-        let Some(loads) = DriveLoads::new(&self.dynamics, pose) else { return false };
-        let forces = loads.holding(self.machine);
-        let largest = forces.into_iter().map(f64::abs).fold(0.0, f64::max);
+        let Some(forces) = self.gravity.holding(&self.dynamics, pose) else { return false };
+        let largest = forces.into_iter().fold(0.0, f64::max);
         let norm = forces.into_iter().map(|force| force * force).sum::<f64>().sqrt();
         let (at_rest, axial_norm) = (
             self.force_changes.at_rest(turn, turned_leg),

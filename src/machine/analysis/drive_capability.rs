@@ -11,6 +11,7 @@
 
 use nalgebra::Vector6;
 
+use super::gravity_cone::GravityCone;
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::InverseDynamics;
 use hexad_core::model::drive_loads::DriveLoads;
@@ -75,6 +76,15 @@ impl DriveCapability {
         let wrenches = leg_wrenches(machine, pose);
         let arms = wrenches.column_iter().map(|wrench| wrench.fixed_rows::<3>(0).norm());
         Some(Self { loads, largest_arm: arms.fold(0.0, f64::max), max_rate: machine.actuator.max_rate_m_s })
+    }
+
+    /// Drives of a model at a pose under gravity in any direction of a cone; `None` where the pose is singular.
+    pub fn in_cone(dynamics: &InverseDynamics, pose: &Pose, cone: &GravityCone) -> Option<Self> {
+        let mut found = Self::of(dynamics, pose)?;
+        let forces = cone.holding(dynamics, pose)?.into_iter();
+        let legs = found.loads.iter_mut().zip(forces.zip(&dynamics.machine().actuator.coulomb_friction_n));
+        legs.for_each(|(load, (force, friction))| load.holding = force + friction);
+        Some(found)
     }
 
     /// The leg that needs the largest force at rest, counted from 0, and that force \[N\].

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | motions of a task | [`envelope`], [`reachable_envelope`] |
 //! | terms of the model that they need | [`fidelity_error`], [`fidelity_choice`] |
-//! | workspace | [`drive_capability`], [`pose_quality`], [`region_shape`], [`clearance`], [`region_search`], [`region_proof`] |
+//! | workspace | [`drive_capability`], [`gravity_cone`], [`pose_quality`], [`region_shape`], [`clearance`], [`region_search`], [`region_proof`] |
 //! | collisions between legs | [`leg_crossing`] |
 //! | other poses with the same leg lengths | [`assembly_modes`], [`other_pose_search`] |
 //! | parameters of a machine from recorded motions | [`identification`], [`drive_delay`] |
@@ -31,6 +31,7 @@ pub mod excitation_design;
 pub mod fidelity_choice;
 pub mod fidelity_error;
 pub mod force_integrals;
+pub mod gravity_cone;
 pub mod held_forces;
 pub mod identification;
 mod known_delay;

@@ -20,19 +20,22 @@
 //! target): f is convex, so Newton's method from beyond the root always converges to it. A closed form by the triangle
 //! inequality would give less than the machine carries.
 //!
+//! Where gravity may have any direction of a cone, `|g_i + p s_i|` is the largest over it ([`super::gravity_cone`]), convex as well.
+//!
 //! Valid at regular poses at rest: velocities add forces that are not included.
 
-use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3};
 
+use super::gravity_cone::GravityCone;
 use hexad_core::control::constants::MAX_HOLDING_SHARE;
 use hexad_core::model::LEGS;
 use hexad_core::model::active_forces::InverseDynamics;
-use hexad_core::model::fidelity::Exact;
+use hexad_core::model::drive_loads::DriveLoads;
 use hexad_core::model::inverse_jacobian::leg_wrenches;
 use hexad_core::model::kinematic_state::KinematicState;
 use hexad_core::model::machine::Machine;
 use hexad_core::model::mass_matrix::MassMatrix;
-use hexad_core::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad_core::model::rigid::Pose;
 
 /// Bound on the steps of Newton's method for a payload; five are usual.
 const MAX_PAYLOAD_STEPS: usize = 50;
@@ -65,6 +68,7 @@ pub struct PoseEvaluator {
     model: InverseDynamics,
     mass: MassMatrix,
     demand: AccelerationDemand,
+    gravity: GravityCone,
     /// Sign of `det N` at home.
     home_sign: f64,
 }
@@ -100,8 +104,14 @@ impl PoseEvaluator {
             model: InverseDynamics::new(machine),
             mass: MassMatrix::new(machine),
             demand,
+            gravity: GravityCone::new(machine.gravity_m_s2, 0.0),
             home_sign: home.sensitivity().determinant.signum(),
         }
+    }
+
+    /// The same under gravity in any direction within so much of the machine's.
+    pub fn in_cone(self, half_angle_rad: f64) -> Self {
+        Self { gravity: GravityCone::new(self.model.machine().gravity_m_s2, half_angle_rad), ..self }
     }
 
     /// The quality of a pose.
@@ -133,12 +143,8 @@ impl PoseEvaluator {
     /// The forces of every leg, `None` at a singular pose.
     fn leg_forces(&self, pose: &Pose) -> Option<[LegForceBound; LEGS]> {
         let machine = self.model.machine();
-        let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
         let arm = pose.rotation * machine.platform.center_of_mass_m;
         let tilde = arm.cross_matrix();
-        let weight = Vector6::from_iterator(
-            arm.cross(&machine.gravity_m_s2).iter().chain(&machine.gravity_m_s2).copied(),
-        );
         let mut mass = Matrix6::zeros();
         for (row, column, block) in
             [(0, 0, -tilde * tilde), (0, 3, tilde), (3, 0, -tilde), (3, 3, Matrix3::identity())]
@@ -147,18 +153,19 @@ impl PoseEvaluator {
         }
         let factors = leg_wrenches(machine, pose).lu();
         let [of_machine, of_mass] = [factors.solve(&self.mass.at(pose))?, factors.solve(&mass)?];
-        let still = factors.solve(&self.model.load_of::<Exact>(&rest).total())?;
-        let still_mass = factors.solve(&-weight)?;
+        let holding = DriveLoads::holding_rows(&self.model, pose)?;
         let row = |matrix: &Matrix6<f64>, leg: usize, first: usize| -> RowVector3<f64> {
             matrix.fixed_view::<1, 3>(leg, first).into()
         };
         let mut legs = [LegForceBound::default(); LEGS];
-        let rest = still.iter().zip(&still_mass).zip(machine.actuator.coulomb_friction_n);
-        for (i, (leg, ((own, added), friction))) in legs.iter_mut().zip(rest).enumerate() {
+        let rest = holding.into_iter().zip(machine.actuator.coulomb_friction_n);
+        for (i, (leg, (own, friction))) in legs.iter_mut().zip(rest).enumerate() {
             let pair = |first| [row(&of_machine, i, first), row(&of_mass, i, first)];
             *leg = LegForceBound {
                 friction,
-                still: [*own, *added],
+                gravity: self.gravity,
+                // A mass under gravity takes the forces of one that accelerates the other way.
+                still: [own, -row(&of_mass, i, 3).transpose()],
                 angular: pair(0).map(|row| row * self.demand.angular_rad_s2),
                 linear: pair(3).map(|row| row * self.demand.linear_m_s2),
             };
@@ -167,11 +174,13 @@ impl PoseEvaluator {
     }
 }
 
-/// Bound on the force of one leg: of the machine without payload, and per kilogram of payload \[N\], \[N/kg\].
+/// Bound on the force of one leg: of the machine without payload, and per kilogram of payload.
 #[derive(Clone, Copy, Debug, Default)]
 struct LegForceBound {
     friction: f64,
-    still: [f64; 2],
+    gravity: GravityCone,
+    /// At rest, per unit of gravity.
+    still: [Vector3<f64>; 2],
     /// Under the demanded accelerations, by direction.
     angular: [RowVector3<f64>; 2],
     linear: [RowVector3<f64>; 2],
@@ -180,8 +189,10 @@ struct LegForceBound {
 impl LegForceBound {
     /// f(p) and its slope.
     fn largest(&self, mass: f64) -> (f64, f64) {
-        let [still, added] = self.still;
-        let force = still + mass * added;
+        let [own, added] = self.still;
+        let row = own + added * mass;
+        let gravity = self.gravity.worst(&row);
+        let (force, added) = (row.dot(&gravity), added.dot(&gravity));
         let (mut sum, mut slope) = (force.abs() + self.friction, force.signum() * added);
         for [own, added] in [self.angular, self.linear] {
             let row: Vector3<f64> = (own + added * mass).transpose();
@@ -194,18 +205,15 @@ impl LegForceBound {
 
     /// The smallest mass at which the force is the limit, or what may be needed at rest.
     fn payload(&self, limit: f64) -> f64 {
-        let [still, added] = self.still;
-        let held = MAX_HOLDING_SHARE * limit - self.friction;
-        let at_rest =
-            if added == 0.0 { f64::INFINITY } else { (held - still * added.signum()) / added.abs() };
-        let is_held = still.abs() <= held;
-        if is_held { self.payload_in_motion(limit).min(at_rest) } else { 0.0 }
+        let at_rest = Self { angular: Default::default(), linear: Default::default(), ..*self };
+        self.payload_under(limit).min(at_rest.payload_under(MAX_HOLDING_SHARE * limit))
     }
 
-    /// The smallest mass at which the force under the demanded accelerations is the limit.
-    fn payload_in_motion(&self, limit: f64) -> f64 {
+    /// The smallest mass at which f is the limit.
+    fn payload_under(&self, limit: f64) -> f64 {
         let [_, still] = self.still;
-        let growth = still.abs() + self.angular[1].norm() + self.linear[1].norm();
+        let growth =
+            still.dot(&self.gravity.worst(&still)).abs() + self.angular[1].norm() + self.linear[1].norm();
         let (bare, _) = self.largest(0.0);
         if !(bare <= limit) {
             return 0.0;

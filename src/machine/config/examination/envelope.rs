@@ -3,7 +3,6 @@
 use super::Examiner;
 use super::machine::examine_holding;
 use crate::analysis::clearance::{Clearance, WorkspaceLimit};
-use crate::analysis::drive_capability::DriveCapability;
 use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::analysis::region_proof::{RegionProof, poses, prove};
 use crate::config::machine::rounded;
@@ -20,14 +19,14 @@ pub(super) fn examine(examiner: &mut Examiner) {
     let Some(bounds) = &config.deployment.envelope else { return };
     let limits = &config.deployment.limits;
     let reachable = config.machine.with_stroke_margin(limits.stroke_margin_m);
-    match prove(&reachable, &Clearance::new(&reachable, limits.condition), bounds) {
+    let clearance = Clearance::new(&reachable, limits.condition).in_cone(examiner.cone_rad);
+    match prove(&reachable, &clearance, bounds) {
         RegionProof::Clear => examine_forces(examiner, bounds),
         RegionProof::Violated(offsets, WorkspaceLimit::HoldingForce(_)) => {
             let x: [f64; 6] =
                 (nalgebra::Vector6::from(config.machine.home) + nalgebra::Vector6::from(offsets)).into();
             let pose = TaskState::at_rest(x).motion().pose;
-            let drives = DriveCapability::new(&config.machine, &pose);
-            let Some((leg, force)) = drives.map(|drives| drives.largest_holding_force()) else { return };
+            let Some((leg, force)) = examiner.largest_holding_force(&pose) else { return };
             let place = format!("within [envelope] {}", offset_text(&offsets));
             examine_holding(examiner, leg, force, &place);
         }
@@ -46,21 +45,13 @@ pub(super) fn examine(examiner: &mut Examiner) {
 /// motion. Between samples of a box without singular poses forces vary slowly; the margin covers it.
 fn examine_forces(examiner: &mut Examiner, bounds: &EnvelopeBounds) {
     let machine = &examiner.config.machine;
-    let forces = poses(machine, bounds)
-        .filter_map(|state| Some((state, inverse_dynamics::<Exact>(machine, &state.motion())?)));
-    let hardest = |(state, forces): (_, [f64; LEGS])| {
-        let largest = |most: (usize, f64), (leg, force): (usize, f64)| {
-            if force.abs() > most.1 { (leg, force.abs()) } else { most }
-        };
-        (state, forces.into_iter().enumerate().fold((0, 0.0), largest))
-    };
-    let held = forces.map(hardest).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-    let Some((state, (leg, force))) = held else { return };
-    let force = force + machine.actuator.largest_coulomb_friction();
-    if force > MAX_HOLDING_SHARE * machine.actuator.weakest_available_force_n() {
-        let mut offsets: [f64; 6] = state.x.into();
+    let states = poses(machine, bounds).map(|state| state.x.into());
+    let Some(held) = examiner.gravity().worst_holding(machine, states) else { return };
+    if held.force_ratio > MAX_HOLDING_SHARE {
+        let mut offsets = held.pose;
         offsets.iter_mut().zip(machine.home).for_each(|(x, home)| *x -= home);
-        examine_holding(examiner, leg, force, &format!("within [envelope] {}", offset_text(&offsets)));
+        let place = format!("within [envelope] {}", offset_text(&offsets));
+        examine_holding(examiner, held.leg - 1, held.force_n, &place);
         return;
     }
     examine_motion(examiner, bounds);

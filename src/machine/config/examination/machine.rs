@@ -4,6 +4,7 @@ use super::Examiner;
 use crate::analysis::drive_capability::DriveCapability;
 use crate::analysis::leg_crossing::{CrossingKind, LegCrossing, leg_crossings};
 use crate::config::machine::rounded;
+use crate::text::numbers::significant;
 use hexad_core::control::constants::MAX_HOLDING_SHARE;
 use hexad_core::model::LEGS;
 use hexad_core::model::machine::Machine;
@@ -17,7 +18,7 @@ pub(super) fn examine(examiner: &mut Examiner) {
     let machine = &examiner.config.machine;
     let pose = machine.home_pose();
     let Some(drives) = DriveCapability::new(machine, &pose) else { return };
-    let (leg, force) = drives.largest_holding_force();
+    let Some((leg, force)) = examiner.largest_holding_force(&pose) else { return };
     examine_holding(examiner, leg, force, "at home");
     if force <= MAX_HOLDING_SHARE * machine.actuator.weakest_available_force_n() {
         examine_limits(examiner, &drives);
@@ -33,8 +34,12 @@ pub(super) fn examine_holding(examiner: &mut Examiner, leg: usize, force: f64, p
     let actuator = &examiner.config.machine.actuator;
     let (limit, available) = (actuator.max_force_n, actuator.weakest_available_force_n());
     if force > MAX_HOLDING_SHARE * available {
+        let gravity = match examiner.cone_rad.to_degrees() {
+            0.0 => String::new(),
+            angle => format!(" with gravity up to {} deg from gravity_m_s2", significant(angle)),
+        };
         let bound = format!(
-            "must be at least {} to hold the platform: leg {} needs {} N {place}, {:.0} % of the limit, and at most {:.0} % may be needed",
+            "must be at least {} to hold the platform: leg {} needs {} N {place}{gravity}, {:.0} % of the limit, and at most {:.0} % may be needed",
             rounded((force / MAX_HOLDING_SHARE * limit / available).ceil()),
             leg + 1,
             rounded(force),

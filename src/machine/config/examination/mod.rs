@@ -11,6 +11,10 @@ use super::control_loops::{ControlLoop, loops, unstable_timeout_ms};
 use super::deployment::control::optimum_hz;
 use super::syntax::line_at;
 use super::{Config, ConfigError, Violation};
+use crate::analysis::gravity_cone::{ConeHolding, GravityCone};
+use crate::analysis::region_proof::poses;
+use hexad_core::model::active_forces::InverseDynamics;
+use hexad_core::model::rigid::Pose;
 
 mod envelope;
 mod machine;
@@ -24,12 +28,30 @@ pub struct Examination {
     pub errors: Vec<Violation>,
     /// What is probably not meant.
     pub warnings: Vec<Violation>,
+    /// Forces under gravity in any direction of a cone, if one is examined.
+    pub gravity_cone: Option<ConeHolding>,
 }
 
 impl Config {
     /// Examines the configuration: some milliseconds, with an envelope up to some seconds.
     pub fn examine(&self) -> Examination {
-        let mut examiner = Examiner { config: self, found: Examination::default() };
+        self.examine_in_cone(None)
+    }
+
+    /// The same with drives that must hold the platform under gravity in any direction within so much of the file's.
+    pub fn examine_in_cone(&self, half_angle_rad: Option<f64>) -> Examination {
+        let cone_rad = half_angle_rad.unwrap_or(0.0);
+        let mut examiner = Examiner { config: self, cone_rad, found: Examination::default() };
+        examiner.found.gravity_cone = half_angle_rad.map(|half_angle_rad| {
+            let cone = GravityCone::new(self.machine.gravity_m_s2, half_angle_rad);
+            let in_envelope = self.deployment.envelope.as_ref();
+            let at_rest = |bounds| poses(&self.machine, bounds).map(|state| state.x.into());
+            ConeHolding {
+                half_angle_rad,
+                at_home: cone.worst_holding(&self.machine, [self.machine.home]),
+                hardest: in_envelope.and_then(|bounds| cone.worst_holding(&self.machine, at_rest(bounds))),
+            }
+        });
         usual::examine(&mut examiner);
         values::examine(&mut examiner);
         machine::examine(&mut examiner);
@@ -52,10 +74,21 @@ impl Examination {
 /// Collects what an examination finds.
 struct Examiner<'a> {
     config: &'a Config,
+    /// Half angle of the directions of gravity.
+    cone_rad: f64,
     found: Examination,
 }
 
 impl Examiner<'_> {
+    fn gravity(&self) -> GravityCone {
+        GravityCone::new(self.config.machine.gravity_m_s2, self.cone_rad)
+    }
+
+    /// The leg, counted from 0, that needs the largest force to hold the platform under gravity in any direction of the cone.
+    fn largest_holding_force(&self, pose: &Pose) -> Option<(usize, f64)> {
+        self.gravity().largest_holding_force(&InverseDynamics::new(&self.config.machine), pose)
+    }
+
     fn error(&mut self, key: &str, value: impl Into<String>, bound: impl Into<String>) {
         let violation = self.violation(key, value.into(), bound.into());
         self.found.errors.push(violation);
