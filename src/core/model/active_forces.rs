@@ -124,11 +124,11 @@ impl InverseDynamics {
         &self,
         simd: S,
         motion: &Motion,
-        gravity: &Vector3<f64>,
+        gravity_m_s2: &Vector3<f64>,
     ) -> Option<LegLanes> {
         let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
         let factorization = Factorization::new(simd, &self.joints, &legs);
-        let (wrench, axial) = self.load::<_, M>(simd, motion, gravity, &legs);
+        let (wrench, axial) = self.load::<_, M>(simd, motion, gravity_m_s2, &legs);
         factorization.forces(&legs, &wrench, axial)
     }
 
@@ -158,7 +158,7 @@ impl InverseDynamics {
         &self,
         simd: S,
         motion: &Motion,
-        gravity: &Vector3<f64>,
+        gravity_m_s2: &Vector3<f64>,
         legs: &LegGeometry<S>,
     ) -> (LaneWrench<S>, f64x8<S>) {
         let velocity = legs.velocity(simd, &motion.twist);
@@ -168,7 +168,7 @@ impl InverseDynamics {
         let map = acceleration_map(&twist, &acceleration);
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
         let universal_axis = Lanes3::load(simd, &self.machine.joints.universal_axis);
-        let accelerations = [joint_acceleration, Lanes3::splat(simd, gravity)];
+        let accelerations = [joint_acceleration, Lanes3::splat(simd, gravity_m_s2)];
         let reaction = ForceOnLeg::new::<M>(simd, &self.legs, universal_axis, legs, &velocity, accelerations);
         let mut wrench = LaneWrench {
             torque: legs.arm.cross(reaction.transverse).folded(),
