@@ -111,7 +111,8 @@ impl GravityCone {
         machine: &Machine,
         poses: impl IntoIterator<Item = [f64; 6]>,
     ) -> Option<WorstHolding> {
-        let (dynamics, available) = (InverseDynamics::new(machine), machine.actuator.weakest_available_force_n());
+        let (dynamics, available) =
+            (InverseDynamics::new(machine), machine.actuator.weakest_available_force_n());
         let legs = |pose: [f64; 6]| {
             let rows = DriveLoads::holding_rows(&dynamics, &TaskState::at_rest(pose).motion().pose)?;
             let legs = (1..).zip(rows).zip(machine.actuator.coulomb_friction_n);
