@@ -13,8 +13,7 @@ use super::{files, source};
 /// What a name ends with, after an underscore.
 const UNITS: &str = "m m2 m3 rad s ns n kg hz m_s m_s2 rad_s rad_s2 s2 s3 m2_s4 kg_m2 n_s_m n_s";
 /// Words for a number without a unit.
-const WITHOUT_UNIT: &str =
-    "ratio ratios share shares scale condition sine norm gain correlation factor count determinant periods";
+const WITHOUT_UNIT: &str = "ratio ratios share shares scale condition sine norm gain correlation factor count determinant periods cost precision quantile";
 /// What a vector is, by its own name or its owner's.
 const VECTORS: &str = "acceleration velocity displacement direction axis wrench twist pose offset";
 

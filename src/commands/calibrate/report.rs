@@ -130,9 +130,9 @@ impl CalibrationReport {
             legs: leg_values(&Geometry::of(task.machine), found),
             before: found.before.into(),
             after: found.after.into(),
-            rows_before: over(|row| &row.before),
-            rows_after: over(|row| &row.after),
-            rows_left_out: over(|row| &row.left_out),
+            rows_before: over(|row| &row.displacement_before),
+            rows_after: over(|row| &row.displacement_after),
+            rows_left_out: over(|row| &row.displacement_left_out),
             suspected_lines: poses.iter().filter(|row| row.is_suspected).map(|row| row.line).collect(),
             poses,
             determined: found.directions.determined,
@@ -143,7 +143,7 @@ impl CalibrationReport {
             tracker_angle_rad: found.noise.angle_rad,
             noise_factor: found.noise_factor,
             cost: found.cost,
-            second_start_difference: found.second_start_difference,
+            second_start_difference: found.second_start_difference_ratio,
         }
     }
 

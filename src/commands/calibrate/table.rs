@@ -36,14 +36,14 @@ pub(super) fn read_rows(
         )));
     }
     let rows = lengths.rows().iter().zip(seen);
-    let rows = rows.map(|(lengths, seen)| Row { lengths: vector(lengths), seen }).collect();
+    let rows = rows.map(|(lengths, seen)| Row { lengths_m: vector(lengths), seen }).collect();
     Ok((rows, lengths.lines().to_vec()))
 }
 
 /// Lengths and poses in the base frame.
 pub(super) fn poses_in_base(rows: &[Row]) -> Result<Vec<(Vector6<f64>, Pose)>, Failure> {
     let pose = |row: &Row| match &row.seen {
-        Seen::Probe(pose) => Ok((row.lengths, *pose)),
+        Seen::Probe(pose) => Ok((row.lengths_m, *pose)),
         Seen::Reflectors(_) => Err(Failure::before_start(
             "--offsets-only takes poses in the base frame: columns x, y, z and alpha, beta, gamma, not reflectors",
         )),

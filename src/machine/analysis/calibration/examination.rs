@@ -29,11 +29,11 @@ pub struct PoseErrors {
 #[derive(Clone, Debug)]
 pub struct RowResult {
     /// From the pose by the lengths to the pose by the tracker, with the drawn machine and with the calibrated one \[rad\], \[m\].
-    pub before: Option<Vector6<f64>>,
-    /// See [`Self::before`].
-    pub after: Option<Vector6<f64>>,
+    pub displacement_before: Option<Vector6<f64>>,
+    /// See [`Self::displacement_before`].
+    pub displacement_after: Option<Vector6<f64>>,
     /// The same with the machine that the other rows determine.
-    pub left_out: Option<Vector6<f64>>,
+    pub displacement_left_out: Option<Vector6<f64>>,
     /// Length by the tracker less measured length of each leg, with the calibrated machine \[m\].
     pub legs_m: [f64; LEGS],
     /// The same with the drawn machine \[m\].
@@ -168,9 +168,9 @@ pub fn row_results(
                 difference.map_or([f64::NAN; LEGS], |difference| (by_pose * difference).into())
             };
             RowResult {
-                before,
-                after,
-                left_out: left_out(terms, *weight, &minimum.covariance)
+                displacement_before: before,
+                displacement_after: after,
+                displacement_left_out: left_out(terms, *weight, &minimum.covariance)
                     .and_then(|residual| terms.difference(&residual)),
                 legs_m: legs(&minimum.unknowns, pose, after),
                 legs_before_m: legs(drawn, drawn_pose, before),

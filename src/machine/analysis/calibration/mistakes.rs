@@ -71,8 +71,8 @@ impl Mistake {
     fn corrected(self, row: &Row) -> Row {
         let mut row = row.clone();
         match self {
-            Self::ExchangedLegs(a, b) => row.lengths.swap_rows(a, b),
-            Self::LengthUnit(factor) => row.lengths *= factor,
+            Self::ExchangedLegs(a, b) => row.lengths_m.swap_rows(a, b),
+            Self::LengthUnit(factor) => row.lengths_m *= factor,
             Self::TrackerUnit(factor) => row.seen.for_each_place(|place| *place *= factor),
             Self::MirroredAxis(axis) => {
                 let mut signs = Vector3::repeat(1.0);

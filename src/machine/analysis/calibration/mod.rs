@@ -103,7 +103,7 @@ pub struct Calibration {
     /// See [`solve`].
     pub cost: f64,
     /// Difference of the cost from another start, over the cost.
-    pub second_start_difference: f64,
+    pub second_start_difference_ratio: f64,
     /// What the rows determine.
     pub directions: Directions,
     /// Errors over the workspace with the drawn machine.
@@ -157,7 +157,7 @@ impl Task<'_> {
             noise,
             noise_factor,
             cost: minimum.cost,
-            second_start_difference: (second - minimum.cost).abs() / minimum.cost,
+            second_start_difference_ratio: (second - minimum.cost).abs() / minimum.cost,
             directions: Directions::of(&covariance, tolerance_m),
             before: PoseErrors::of(changes.iter()),
             after: PoseErrors::expected(&geometry, &covariance, self.workspace),

@@ -97,7 +97,7 @@ pub enum Seen {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// \[m\]
-    pub lengths: Vector6<f64>,
+    pub lengths_m: Vector6<f64>,
     /// By the tracker.
     pub seen: Seen,
 }
@@ -213,7 +213,7 @@ impl Unknowns {
             pose: MatrixXx6::zeros(count),
         };
         let (lengths, by_pose, by_values) = self.geometry.lengths(pose);
-        terms.residual.fixed_rows_mut::<6>(0).copy_from(&((lengths - row.lengths) / noise.length_m));
+        terms.residual.fixed_rows_mut::<6>(0).copy_from(&((lengths - row.lengths_m) / noise.length_m));
         terms.pose.fixed_view_mut::<6, 6>(0, 0).copy_from(&(by_pose / noise.length_m));
         terms.shared.view_mut((0, 0), (LEGS, GEOMETRY_VALUES)).copy_from(&(by_values / noise.length_m));
         for (index, (column, seen, place)) in seen.into_iter().enumerate() {

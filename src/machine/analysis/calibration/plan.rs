@@ -130,7 +130,7 @@ fn sensitivity(machine: &Machine, pose: &Pose, noise: &Noise) -> Option<MatrixXx
         mount: Mount::Probe(pose_of(&[0.0; 6])),
         poses: vec![],
     };
-    let row = Row { lengths: unknowns.geometry.lengths(pose).0, seen: Seen::Probe(*pose) };
+    let row = Row { lengths_m: unknowns.geometry.lengths(pose).0, seen: Seen::Probe(*pose) };
     let terms = unknowns.terms(&row, pose, noise);
     let [by_lengths, by_tracker] = [0, LEGS].map(|row| terms.pose.fixed_rows::<6>(row).into_owned());
     let by_tracker: Matrix6<f64> = by_lengths * by_tracker.try_inverse()?;

@@ -24,7 +24,7 @@ const LEAST_SINGULAR_VALUE: f64 = 1e-9;
 pub fn start(machine: &Machine, rows: &[Row]) -> Option<Unknowns> {
     let by_lengths = |row: &Row| {
         let mut tracker = Tracker::new(machine, machine.home_pose());
-        let found = tracker.find(machine, &row.lengths.into()).0 == TrackingResult::Found;
+        let found = tracker.find(machine, &row.lengths_m.into()).0 == TrackingResult::Found;
         found.then(|| *tracker.pose())
     };
     let poses: Vec<_> = rows.iter().map(by_lengths).collect();
