@@ -106,7 +106,7 @@ fn a_table_becomes_a_machine_file_in_which_only_joints_are_new() {
     folder.refuses("calibrate @M @/poses.csv --output @/new.toml", &["new.toml exists already"]);
 }
 
-/// A file of the tracker beside that of the lengths, with quaternions; then reflectors, one hidden in every fourth row.
+/// A file of the tracker beside the file of lengths, with quaternions; then reflectors, one hidden in every fourth row.
 #[test]
 fn the_tracker_has_a_file_of_its_own() {
     let folder = Folder::new("");

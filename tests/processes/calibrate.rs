@@ -1,4 +1,4 @@
-//! The commands of `docs/calibration.md`, as a user types them, with a platform whose joints are not those of its file.
+//! The commands of `docs/calibration.md`, as a user types them, with a platform whose joints differ from its file.
 
 use std::fs;
 

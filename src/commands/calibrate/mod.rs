@@ -54,7 +54,7 @@ pub struct CalibrateArguments {
     #[arg(long, value_name = "POSES", value_parser = clap::value_parser!(u16).range(7..=1000), requires = "output")]
     #[arg(conflicts_with_all = ["poses", "offsets_only", "page", "json"])]
     plan: Option<u16>,
-    /// Find the offsets alone; x, y, z and the orientation are those of the platform in the base frame
+    /// Find the offsets alone; x, y, z and the orientation are of the platform in the base frame
     #[arg(long, conflicts_with_all = ["output", "page", "tracker"])]
     offsets_only: bool,
     /// Standard deviation of each coordinate of a joint and of each offset by the drawing, with its unit

@@ -17,7 +17,7 @@ use hexad_machine::text::units::{ANGLES, LENGTHS};
 
 /// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
-/// Deviation from which a value is that of the drawing, as a share of the tolerance.
+/// Deviation from which a value stays as drawn, as a share of the tolerance.
 const DRAWN_RATIO: f64 = 0.5;
 /// Difference of the costs of two starts that is rounding.
 const SAME_COST: f64 = 1e-6;
@@ -197,7 +197,7 @@ impl CalibrationReport {
         if lines.is_empty() {
             "none".into()
         } else {
-            format!("those of line {}, which count little", lines.join(", "))
+            format!("line {} (they count little)", lines.join(", "))
         }
     }
 

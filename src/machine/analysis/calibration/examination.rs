@@ -101,7 +101,7 @@ fn sensitivity(geometry: &Geometry, pose: &Pose) -> Option<Matrix6xX<f64>> {
     Some(-(by_pose.try_inverse()? * by_values))
 }
 
-/// Displacement from the pose of one geometry to that of another with the same measured lengths, to first order.
+/// Displacement between the poses of two geometries with the same measured lengths, to first order.
 pub fn pose_change(geometry: &Geometry, other: &Geometry, pose: &Pose) -> Option<Vector6<f64>> {
     Some(sensitivity(geometry, pose)? * (other.values() - geometry.values()))
 }

@@ -35,7 +35,7 @@ const MAX_CHANGE_RATIO: f64 = 5.0;
 const MAX_NOISE_FACTOR: f64 = 10.0;
 /// Least noise over the stated one, of simulated measurements without any.
 const MIN_NOISE_FACTOR: f64 = 0.01;
-/// Predicted error of a calibration, over that of the drawing, from which it is none.
+/// Predicted error over the error with the drawing, from which a result is no calibration.
 const MAX_ERROR_RATIO: f64 = 1.0 / 3.0;
 /// Rounds in which noise and minimum are found in turn, and the change of the noise that ends them.
 const MAX_NOISE_ROUNDS: usize = 6;

@@ -6,7 +6,7 @@
 //! reflectors  T X r_k - q_k                                    r_k places on the platform, q_k as measured
 //! ```
 //!
-//! Each is divided by its standard deviation. Rotations change by `R <- exp(w~) R`, as those of
+//! Each is divided by its standard deviation. Rotations change by `R <- exp(w~) R`, as by
 //! [`Pose::displaced`]. `d log(exp(w~) R) = w - f x w / 2 + f x (f x w) / 12` with `f = log(R)`: exact to the fourth order of f.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x6, Matrix6, MatrixXx6, Vector3, Vector6};

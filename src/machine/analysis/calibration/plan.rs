@@ -1,7 +1,7 @@
 //! Poses that determine the joints best.
 //!
 //! A design is D-optimal if the determinant of its information is the largest (Fedorov 1972). Poses are added one by one, each the best of
-//! the candidates, and then exchanged while that helps. The information of a pose is that of its six lengths against the pose by the tracker:
+//! the candidates, and then exchanged while that helps. A pose informs by its six lengths against the tracker's pose:
 //!
 //! ```text
 //! u = lengths by the tracker - lengths,   V = sigma_l^2 I + J V_tracker J^T,   M = (du/dx)^T V^-1 (du/dx)

@@ -59,7 +59,7 @@ pub struct Minimum {
     pub rows: Vec<(RowTerms, f64)>,
 }
 
-/// Quantile of chi-square by that of the normal distribution (Wilson and Hilferty): to 1 % from three degrees of freedom on.
+/// Quantile of chi-square from a quantile of the normal distribution (Wilson and Hilferty): to 1 % from three degrees of freedom on.
 pub fn chi_square(degrees: usize, normal: f64) -> f64 {
     let n = degrees as f64;
     n * (1.0 - 2.0 / (9.0 * n) + normal * (2.0 / (9.0 * n)).sqrt()).powi(3)

@@ -1,6 +1,6 @@
 //! First guess: where the tracker's frame and the mount are if the machine is as drawn.
 //!
-//! With the poses `R, x` of the drawn machine at the measured lengths, and those of the probe, `R_m, p`:
+//! With the poses `R, x` of the drawn machine at the measured lengths, and the probe's poses `R_m, p`:
 //!
 //! ```text
 //! p = M x + R_m s + t          linear in M, s, t;   M is nearly the rotation from base to tracker
